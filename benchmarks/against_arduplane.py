@@ -169,10 +169,13 @@ def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
     return np.concatenate(across), np.concatenate(up)
 
 
-def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
-    """Measure the overshoot at each corner that is sharp enough and has a long enough leg after it."""
+def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
+    """Return the figures of one flight."""
+    across, _ = _along_legs(setup, track)
+    error = track.height_error
+    # Overshoot at each corner that is sharp enough and has a long enough leg after it.
     starts, courses, runs = _legs(setup)
-    found = []
+    corners = []
     for i in range(1, len(runs)):
         turn = math.atan2(
             courses[i - 1, 0] * courses[i, 1] - courses[i - 1, 1] * courses[i, 0], float(courses[i - 1] @ courses[i])
@@ -186,20 +189,13 @@ def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
         on_leg = (along > 0.0) & (along < LOOKED_AT * runs[i])
         # A turn to the left (positive here) overshoots to the right.
         over = float((-math.copysign(1.0, turn) * left[on_leg]).max()) if on_leg.any() else math.nan
-        found.append(Corner(i, -math.degrees(turn), over))
-    return tuple(found)
-
-
-def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
-    """Return the figures of one flight."""
-    across, _ = _along_legs(setup, track)
-    error = track.height_error
+        corners.append(Corner(i, -math.degrees(turn), over))
     return Flown(
         ended,
         float(np.nanmin(track.clearance)),
         (float(error.min()), float(error.max())),
         float(np.abs(across).max()),
-        _corners(setup, track),
+        tuple(corners),
     )
 
 
@@ -243,10 +239,10 @@ def summary(all_compared: list[Compared]) -> dict[str, Any]:
         "corners": len(ratios),
         "overshoot ratio, median": median,
         "overshoot ratio, 5 to 95 %": (low, high),
-        "least clearance, law less real, m": (min(clearance), max(clearance)),
+        "least clearance, model minus ArduPlane, m": (min(clearance), max(clearance)),
         "apart across, RMS and most, m": [max(one.apart_across[k] for one in all_compared) for k in (0, 1)],
         "apart in height, RMS and most, m": [max(one.apart_up[k] for one in all_compared) for k in (0, 1)],
-        "completed, law and real": [
+        "completed, model and ArduPlane": [
             sum(flown.ended == "completed" for flown in (one.law if k else one.real for one in all_compared))
             for k in (1, 0)
         ],
@@ -264,34 +260,33 @@ def kept_flight(compared: Compared, setup: FlightSetup) -> dict[str, Any]:
     }
 
 
-def _print(one: Compared, seconds: float) -> None:
-    """Print one comparison, with the time that it took, s."""
-    pairs = zip(one.law.corners, one.real.corners, strict=True)
-    over = " ".join(f"{law.turn_deg:.0f}°:{law.overshoot:.1f}/{real.overshoot:.1f}" for law, real in pairs)
-    (law_low, law_high), (low, high) = one.law.height_error, one.real.height_error
-    print(
-        f"{one.seed:4d} {one.wind:4.1f} {one.turbulence:8s}"
-        f" clearance {one.law.clearance:6.1f} {one.real.clearance:6.1f} {one.law.clearance - one.real.clearance:+.1f}"
-        f" height {law_low:.1f}..{law_high:.1f} {low:.1f}..{high:.1f}"
-        f" apart {one.apart_across[0]:.2f} {one.apart_up[0]:.2f}  {over}  {seconds:.0f} s",
-        flush=True,
-    )
-
-
 def main() -> None:
     """Compare, print, and write the results."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.against_arduplane")
     parser.add_argument("--plans", type=int, default=40)
     parser.add_argument("--from", dest="first", type=int, default=1, help="seed of the first plan")
-    parser.add_argument("--steep", action="store_true", help="plans climb with all the throttle there is")
-    parser.add_argument("--json", default="runs/against-arduplane.json", help="where the figures go")
-    parser.add_argument("--keep", help="where the real flights go, for tests")
+    parser.add_argument("--steep", action="store_true", help="plan climbs at full throttle")
+    parser.add_argument("--json", default="runs/against-arduplane.json", help="file for the figures")
+    parser.add_argument("--keep", help="file for ArduPlane's flights, for tests")
     args = parser.parse_args()
     found, kept = [], []
     for seed in range(args.first, args.first + args.plans):
         begun = time.monotonic()
         compared, setup = compare(seed, steep=args.steep)
-        _print(compared, time.monotonic() - begun)
+        law, real = compared.law, compared.real
+        over = " ".join(
+            f"{corner.turn_deg:.0f}°:{corner.overshoot:.1f}/{other.overshoot:.1f}"
+            for corner, other in zip(law.corners, real.corners, strict=True)
+        )
+        print(
+            f"{compared.seed:4d} {compared.wind:4.1f} {compared.turbulence:8s}"
+            f" clearance {law.clearance:6.1f} {real.clearance:6.1f} {law.clearance - real.clearance:+.1f}"
+            f" height {law.height_error[0]:.1f}..{law.height_error[1]:.1f}"
+            f" {real.height_error[0]:.1f}..{real.height_error[1]:.1f}"
+            f" apart {compared.apart_across[0]:.2f} {compared.apart_up[0]:.2f}  {over}"
+            f"  {time.monotonic() - begun:.0f} s",
+            flush=True,
+        )
         found.append(compared)
         kept.append(kept_flight(compared, setup))
     figures = summary(found)

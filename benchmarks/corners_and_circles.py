@@ -31,10 +31,10 @@ def main() -> None:
                 _compare("radius", flight, law.radius(middle), real.radius(middle), ratios)
             else:
                 _compare("greatest distance", flight, *wide, ratios)
-            print(f"  nearest to the middle: {near[0]:.1f} m by law, {near[1]:.1f} m by ArduPlane")
+            print(f"  nearest to the middle: {near[0]:.1f} m by the model, {near[1]:.1f} m by ArduPlane")
     for kind, found in ratios.items():
         low, median, high = np.percentile(found, (5.0, 50.0, 95.0))
-        print(f"{kind}, law by ArduPlane: {len(found)}, 5 % {low:.3f}, median {median:.3f}, 95 % {high:.3f}")
+        print(f"{kind}, model / ArduPlane: {len(found)}, 5 % {low:.3f}, median {median:.3f}, 95 % {high:.3f}")
 
 
 def _compare(kind: str, name: str, law: float, real: float, ratios: dict[str, list[float]]) -> None:
@@ -43,7 +43,7 @@ def _compare(kind: str, name: str, law: float, real: float, ratios: dict[str, li
         # The loiter was left before its distance from the centre had settled.
         return
     ratios[kind].append(law / real)
-    print(f"{name}: {kind} {law:.1f} m by law, {real:.1f} m by ArduPlane, {law / real:.3f}")
+    print(f"{name}: {kind} {law:.1f} m by the model, {real:.1f} m by ArduPlane, {law / real:.3f}")
 
 
 if __name__ == "__main__":

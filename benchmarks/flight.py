@@ -246,7 +246,7 @@ def loop_cost(
     Both step the same configuration at the same rate, in turns of ten seconds of flight, so that both are slowed down
     alike on a busy machine.
 
-    ardupilot: True to fly ArduPlane's law instead of planfly's guidance.
+    ardupilot: True to fly the model of ArduPlane instead of planfly's guidance.
     engine: flight model of the closed loop.
     """
     ratios, closed, bares = [], [], []
@@ -375,7 +375,7 @@ def engine_rows() -> dict[str, float]:
             found[f"real-time factor{where} at {hz} Hz"] = cost.closed
             found["real-time factor of bare JSBSim"] = cost.bare
     for engine, where in _ENGINES.items():
-        found[f"ArduPlane's law{where} / bare JSBSim at 60 Hz"] = loop_cost(60, ardupilot=True, engine=engine).ratio
+        found[f"model of ArduPlane{where} / bare JSBSim at 60 Hz"] = loop_cost(60, ardupilot=True, engine=engine).ratio
     demo = engine_cost(demo_setup())
     found[f"demo in the air, {demo.seconds:.0f} s, JSBSim, CPU s"] = demo.jsbsim
     found["demo in the air, compiled, CPU s"] = demo.compiled

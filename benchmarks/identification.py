@@ -1,4 +1,4 @@
-"""Measure how well aircraft of known truth are identified from their logs, flown by ArduPlane's law.
+"""Measure how well aircraft of known truth are identified from their logs, flown by the model of ArduPlane.
 
     python -m benchmarks.identification --first 1001 --count 10 --repeats 2 --out build/identification.json
     python -m benchmarks.identification --first 4001 --count 3 --missions --shorts 0 --out build/missions.json
@@ -128,7 +128,7 @@ class NotFlown(Exception):
 
 
 def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Aircraft]:
-    """Fly missions A and B by ArduPlane's law, each in its own wind and light turbulence.
+    """Fly missions A and B by the model of ArduPlane, each in its own wind and light turbulence.
 
     Raises NotFlown.
     """

@@ -4,8 +4,8 @@
 
 The bases are the X8, the Zagi, and a wing of 2.1 kg from its data sheet.  The truth of a variant is drawn from 0.8 of
 the priors, for the factors of its base's model, with another mass.  It flies twelve minutes of manoeuvres by
-ArduPlane's law in light turbulence, and its log is identified from the base, once without and once with the battery's
-current.  The performance of the truth and of the result is computed with JSBSim.
+the model of ArduPlane in light turbulence, and its log is identified from the base, once without and once with the
+battery's current.  The performance of the truth and of the result is computed with JSBSim.
 """
 
 import argparse

@@ -145,7 +145,14 @@ def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_fr
     def holds(slope: float) -> bool:
         """Return True if a flight holds a slope, m per m."""
         flown = fly_to_end(Flight(made_setup(leg(slope), aircraft, wind, wind_from), aircraft))
-        return flown.ended == "completed" and _held(flown.track, aircraft.airspeed, direction)
+        track, rows = flown.track, flown.track.leg == 1
+        width = round(5.0 / float(np.median(np.diff(track.time))))
+        speed = track.airspeed[rows].astype(np.float64) - aircraft.airspeed
+        if flown.ended != "completed" or speed.size < width:
+            return False
+        mean = np.convolve(speed, np.full(width, 1.0 / width), "valid")
+        keeps_speed = (-direction * mean).max() <= SPEED_HELD
+        return bool(keeps_speed and np.abs(track.height_error[rows]).max() <= HEIGHT_HELD)
 
     setup = made_setup(leg(0.05), aircraft, wind, wind_from)
 
@@ -157,17 +164,6 @@ def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_fr
     ends = leg(flown)[1:, 2] if math.isfinite(flown) else np.array([AMSL])
     predicted = min(predict(float(amsl)) for amsl in ends)
     return Limit("climb" if direction > 0.0 else "dive", wind, wind_from, predicted, flown)
-
-
-def _held(track: Track, airspeed: float, direction: float) -> bool:
-    """Return True if a flight held airspeed and slope on its leg."""
-    rows = track.leg == 1
-    width = round(5.0 / float(np.median(np.diff(track.time))))
-    speed = track.airspeed[rows].astype(np.float64) - airspeed
-    if speed.size < width:
-        return False
-    mean = np.convolve(speed, np.full(width, 1.0 / width), "valid")
-    return bool((-direction * mean).max() <= SPEED_HELD and np.abs(track.height_error[rows]).max() <= HEIGHT_HELD)
 
 
 def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0, wind_from: float = 0.0) -> Limit:

@@ -190,7 +190,13 @@ def measure(seconds: float) -> dict[str, Any]:
             if package != "ompl":
                 work()
             item = work()
-            _print_row(task.scenario.name, name, item, known)
+            print(
+                f"  {task.scenario.name:<13}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
+                f"{item.length_ratio / known:>8.4f}{item.seconds:>8.2f}{item.checks:>9}"
+                f"{100 * item.callback_share:>8.0f}%"
+            )
+            if not item.safe:
+                print(f"  {'':<13}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
             entry = {key: value for key, value in asdict(item).items() if key != "path"}
             record[f"{task.scenario.name} {name}"] = entry
     if find_spec("ompl") is not None:
@@ -241,16 +247,6 @@ def race(seconds: float) -> dict[str, Any]:
 def _time_to(item: Found, ratio: float, never: float) -> float:
     """Return the first time in the trace at which the length ratio is at most this, s."""
     return next((seconds for seconds, length in item.trace if length <= ratio), never)
-
-
-def _print_row(problem: str, name: str, item: Found, known: float) -> None:
-    """Print the result of a planner on a problem."""
-    print(
-        f"  {problem:<13}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
-        f"{item.length_ratio / known:>8.4f}{item.seconds:>8.2f}{item.checks:>9}{100 * item.callback_share:>8.0f}%"
-    )
-    if not item.safe:
-        print(f"  {'':<13}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
 
 
 def solve_with_planfly(task: Task, seed: int) -> Found:

@@ -1,8 +1,8 @@
 """Fly default plans on three terrains with an autopilot's model or the program itself, and count violations.
 
-``python -m benchmarks.planned_for_autopilots [--law LAW] [--plans N] [--from NUMBER] [--sitl PATH]`` plans random
-scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, GNSS errors) for the autopilot of
-a model (LAW), flies each, and prints the margins of the certificate and of the flight, and at the end the number of
+``python -m benchmarks.planned_for_autopilots [--autopilot NAME] [--plans N] [--from NUMBER] [--sitl PATH]`` plans
+random scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, GNSS errors) for an
+autopilot, flies each, and prints the margins of the certificate and of the flight, and at the end the number of
 violations, with a separate number for moderate turbulence.
 """
 
@@ -37,13 +37,13 @@ class Flown:
     turbulence: str
 
 
-def fly(number: int, law: str, sitl: Path | None) -> Flown:
+def fly(number: int, autopilot: str, sitl: Path | None) -> Flown:
     """Plan and fly the scenario of this number, and print a line about it.
 
-    law: autopilot that the plan is made for.
+    autopilot: autopilot that the plan is made for.
     sitl: program that flies the plan; None to fly it with the autopilot's model.
     """
-    scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot": law}))
+    scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot": autopilot}))
     uav = load_uav(scenario)
     plan = make_plan(scenario, uav, number + 1)
     if not plan.safe:
@@ -71,12 +71,14 @@ def fly(number: int, law: str, sitl: Path | None) -> Flown:
 def main() -> None:
     """Fly, print, and sum up."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.planned_for_autopilots")
-    parser.add_argument("--law", choices=CHOICES["autopilot"], default="ardupilot", help="planned for, and flown by")
+    parser.add_argument(
+        "--autopilot", choices=CHOICES["autopilot"], default="ardupilot", help="autopilot that the plans are made for"
+    )
     parser.add_argument("--plans", type=int, default=100)
     parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
-    parser.add_argument("--sitl", type=Path, help="the program of the autopilot itself (default: its law)")
+    parser.add_argument("--sitl", type=Path, help="the program of the autopilot itself (default: its model)")
     args = parser.parse_args()
-    flown = [fly(number, args.law, args.sitl) for number in range(args.first, args.first + args.plans)]
+    flown = [fly(number, args.autopilot, args.sitl) for number in range(args.first, args.first + args.plans)]
     made = [one for one in flown if one.harm is not None]
     longer = sorted(one.longer for one in made)
     print(

@@ -104,17 +104,12 @@ def main() -> None:
     )
     print(f"{len(safe)} of {len(answers)} planned safely")
     if not args.plan_only:
-        _print_verdicts(safe)
+        print(f"without a flight {dict(Counter(one.drawn for one in safe))}")
+        for turbulence in ("none", "light", "moderate"):
+            flown = Counter(one.flown for one in safe if one.turbulence == turbulence)
+            print(f"flown in {turbulence:8s} turbulence: {dict(flown)}")
     if args.json:
         args.json.write_text(json.dumps([asdict(one) for one in answers], indent=1) + "\n", encoding="utf-8")
-
-
-def _print_verdicts(safe: list[Answer]) -> None:
-    """Print the verdicts of safe plans, without a flight and with one."""
-    print(f"without a flight {dict(Counter(one.drawn for one in safe))}")
-    for turbulence in ("none", "light", "moderate"):
-        flown = Counter(one.flown for one in safe if one.turbulence == turbulence)
-        print(f"flown in {turbulence:8s} turbulence: {dict(flown)}")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ import numpy as np
 import planfly
 from aircraft.catalog import find_aircraft
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.blind import Band
 from aircraft.identification.draws import draw_aircraft, draw_drive_power
 from aircraft.identification.estimate import estimate_model, score_predictions
 from aircraft.identification.flight_record import FlightRecord
@@ -126,7 +125,11 @@ def predict_circle(folder: Path) -> tuple[dict[str, object], Path]:
     known = [band for band in predicted.bands if not np.isnan(band.inside)]
     # The circle begins with leg 1; the flight gets back to the altitude of leg 0 only there.
     begin = predicted.leg_ends[0]
-    on_circle = {band.name: round(_inside_from(band, begin), 3) for band in known}
+    on_circle = {}
+    for band in known:
+        rows_on_circle = band.along >= begin
+        values = {name: getattr(band, name)[rows_on_circle] for name in ("along", "low", "high", "flown")}
+        on_circle[band.name] = round(replace(band, **values).inside, 3)
     rows: dict[str, object] = {
         "inside": {band.name: round(band.inside, 3) for band in known},
         "half_width": {band.name: round(band.half_width, 2) for band in known},
@@ -134,14 +137,6 @@ def predict_circle(folder: Path) -> tuple[dict[str, object], Path]:
         "draws": predicted.draws,
     }
     return rows, folder / "circle" / "predict.png"
-
-
-def _inside_from(band: Band, begin: float) -> float:
-    """Return the share of a band's values inside, from a distance along the legs on, m."""
-    is_later = band.along >= begin
-    return replace(
-        band, along=band.along[is_later], low=band.low[is_later], high=band.high[is_later], flown=band.flown[is_later]
-    ).inside
 
 
 def main() -> None:

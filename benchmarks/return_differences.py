@@ -110,7 +110,7 @@ def main() -> None:
     outside = (table[:, 2] > 0.0) & (table[:, 4] > 0.0) & np.isfinite(table[:, 2]) & np.isfinite(table[:, 4])
     describe("distance outside spheres", (table[:, 4] - table[:, 2])[outside], POINT_MASS_POSITION_ERROR_M)
     sideways = outside & (table[:, 5] < _AMBIGUOUS_TURN_DEG)
-    describe("of these turning one way", (table[:, 4] - table[:, 2])[sideways], POINT_MASS_POSITION_ERROR_M)
+    describe("of these turning in one direction", (table[:, 4] - table[:, 2])[sideways], POINT_MASS_POSITION_ERROR_M)
     _TARGET.parent.mkdir(exist_ok=True)
     _TARGET.write_text(json.dumps(found), encoding="utf-8")
 

@@ -118,27 +118,21 @@ def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
     (folder / "demo.json").write_text(plan_json(plan), encoding="utf-8")
     found: dict[str, tuple[str, ...]] = {"demo, 14 waypoints": ("demo.json",)}
     for count in (100, 500):
+        # Waypoints along a gentle wave through the centre of the map, at one altitude.
+        wave_east = np.linspace(-9_000.0, 9_000.0, count)
+        lat, lon = to_geo(scenario.origin, wave_east, 1_500.0 * np.sin(wave_east / 3_000.0))
+        places = [(round_to_grid(a), round_to_grid(b)) for a, b in zip(lat.tolist(), lon.tolist(), strict=True)]
+        items = [
+            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, *place, 1_080.0)
+            for k, place in enumerate(places, 1)
+        ]
         name = f"w{count}.waypoints"
-        (folder / name).write_text(mission_text(_long_mission(count), "waypoints"), encoding="utf-8")
+        mission = Mission(Home(*places[0], 300.0), tuple(items))
+        (folder / name).write_text(mission_text(mission, "waypoints"), encoding="utf-8")
         found[f"{count} waypoints"] = (name, "--scenario", SCENARIO)
     (folder / "zones.geojson").write_text(_zones(plan.waypoints[:, :2]), encoding="utf-8")
     found["demo, 1,000 zones"] = ("demo.json", "--fence", "zones.geojson")
     return found
-
-
-def _long_mission(count: int) -> Mission:
-    """Make waypoints along a gentle wave through the centre of the map, at one altitude."""
-    scenario = load_scenario(SCENARIO)
-    east = np.linspace(-9_000.0, 9_000.0, count)
-    north = 1_500.0 * np.sin(east / 3_000.0)
-    lat, lon = to_geo(scenario.origin, east, north)
-    items = [
-        MissionItem(
-            k + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, round_to_grid(a), round_to_grid(b), 1_080.0
-        )
-        for k, (a, b) in enumerate(zip(lat.tolist(), lon.tolist(), strict=True))
-    ]
-    return Mission(Home(round_to_grid(float(lat[0])), round_to_grid(float(lon[0])), 300.0), tuple(items))
 
 
 def _zones(path: np.ndarray) -> str:
@@ -148,7 +142,10 @@ def _zones(path: np.ndarray) -> str:
     while len(features) < 1_000:
         number = len(features)
         east, north = rng.uniform(-10_000.0, 10_000.0, 2)
-        if _distance(np.array([east, north]), path) < 250.0:
+        # Distances of the place from the legs of the path.
+        legs, place = np.diff(path, axis=0), np.array([east, north])
+        shares = np.clip(((place - path[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0.0, 1.0)
+        if float(np.hypot(*(path[:-1] + shares[:, None] * legs - place).T).min()) < 250.0:
             continue
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 90.0 + [east, north]
         lat, lon = to_geo(scenario.origin, corners[:, 0], corners[:, 1])
@@ -158,13 +155,6 @@ def _zones(path: np.ndarray) -> str:
             {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [ring]}}
         )
     return json.dumps({"type": "FeatureCollection", "features": features})
-
-
-def _distance(point: np.ndarray, path: np.ndarray) -> float:
-    """Return the distance of a point (2,) from a path (n, 2), m."""
-    along = np.diff(path, axis=0)
-    shares = np.clip(((point - path[:-1]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-    return float(np.hypot(*(path[:-1] + shares[:, None] * along - point).T).min())
 
 
 @contextlib.contextmanager

@@ -1,10 +1,10 @@
 """Compare the verdict on the flight of an autopilot's model with the verdict on the autopilot's own flight.
 
-``python -m benchmarks.verdict_agreement [--law LAW] [--missions N] [--from SEED] [--json FILE]`` makes missions that
-keep one limit narrowly, or exceed it (`tests.field_missions.close_mission`), flies each with the model, with GNSS
-errors, and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both flights
-by the same rules, and counts the differences.  ``--ordinary N`` instead flies ordinary missions with the model alone,
-and counts those that are not flyable.
+``python -m benchmarks.verdict_agreement [--autopilot NAME] [--missions N] [--from SEED] [--json FILE]`` makes
+missions that keep one limit narrowly, or exceed it (`tests.field_missions.close_mission`), flies each with the model,
+with GNSS errors, and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both
+flights by the same rules, and counts the differences.  ``--ordinary N`` instead flies ordinary missions with the model
+alone, and counts those that are not flyable.
 """
 
 import argparse
@@ -74,9 +74,9 @@ def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
     return flown.verdict, low or bool((away < -GRAVE).any())
 
 
-def compare(seed: int, law_name: str, program: Path) -> Answer:
+def compare(seed: int, autopilot_name: str, program: Path) -> Answer:
     """Fly the mission of a seed with the model and with the program, and compare the verdicts."""
-    flight = {name: value for name, value in flight_entries({"autopilot": law_name}).items() if value is not None}
+    flight = {name: value for name, value in flight_entries({"autopilot": autopilot_name}).items() if value is not None}
     made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1], **flight)
     (law, _), (real, lost) = by_law(made), by_program(made, program)
     agree = law.flyable == real.flyable
@@ -86,40 +86,38 @@ def compare(seed: int, law_name: str, program: Path) -> Answer:
 def main() -> None:
     """Fly, print, and sum up."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.verdict_agreement")
-    parser.add_argument("--law", choices=CHOICES["autopilot"], default="ardupilot", help="compared with its program")
+    parser.add_argument(
+        "--autopilot", choices=CHOICES["autopilot"], default="ardupilot", help="autopilot whose model is compared"
+    )
     parser.add_argument("--missions", type=int, default=100)
     parser.add_argument("--from", dest="first", type=int, default=0, help="seed of the first mission")
-    parser.add_argument("--ordinary", type=int, help="so many ordinary missions, by the law alone")
+    parser.add_argument("--ordinary", type=int, help="number of ordinary missions, flown by the model alone")
     parser.add_argument("--json", type=Path, help="also write every answer there")
     args = parser.parse_args()
     if args.ordinary is not None:
-        _ordinary(args.first, args.ordinary)
+        # Count the ordinary missions that the verdict on the model's flight refuses.
+        refused = 0
+        for seed in range(args.first, args.first + args.ordinary):
+            made = ordinary_mission(seed)
+            verdict, _ = by_law(made)
+            if not verdict.flyable:
+                refused += 1
+                print(f"{made.name}  {verdict.headline}", flush=True)
+        print(f"{refused} of {args.ordinary} ordinary missions not flyable by the model")
         return
-    program = Path(os.environ["PLANFLY_PX4" if args.law.startswith("px4") else "PLANFLY_ARDUPLANE"])
+    program = Path(os.environ["PLANFLY_PX4" if args.autopilot.startswith("px4") else "PLANFLY_ARDUPLANE"])
     answers = []
     for seed in range(args.first, args.first + args.missions):
-        answers.append(compare(seed, args.law, program))
+        answers.append(compare(seed, args.autopilot, program))
         one = answers[-1]
-        print(f"{one.name:14s} {'same' if one.agree else 'DIFFER'}  law: {one.law}  real: {one.real}", flush=True)
+        print(f"{one.name:14s} {'same' if one.agree else 'DIFFER'}  model: {one.law}  program: {one.real}", flush=True)
     print(
         f"{sum(one.agree for one in answers)} of {len(answers)} agree;"
-        f" {sum(one.harmed for one in answers)} flyable by the law and harmed in truth;"
+        f" {sum(one.harmed for one in answers)} flyable by the model, but harmed by the program;"
         f" not flyable by the program: {sum(not one.real.startswith('flyable') for one in answers)}"
     )
     if args.json:
         args.json.write_text(json.dumps([asdict(one) for one in answers], indent=1) + "\n", encoding="utf-8")
-
-
-def _ordinary(first: int, count: int) -> None:
-    """Count the ordinary missions that the model's verdict refuses."""
-    refused = 0
-    for seed in range(first, first + count):
-        made = ordinary_mission(seed)
-        verdict, _ = by_law(made)
-        if not verdict.flyable:
-            refused += 1
-            print(f"{made.name}  {verdict.headline}", flush=True)
-    print(f"{refused} of {count} ordinary missions not flyable by the law")
 
 
 if __name__ == "__main__":

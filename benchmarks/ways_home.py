@@ -57,7 +57,7 @@ def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
     found = judge_returns(world, starts, 0.0)
     low = [one.clearance for one in found.each]
     outside = [one.sphere_distance for one in found.each]
-    print(f"from {len(low)} fresh places by the law: {headline(found)}")
+    print(f"from {len(low)} fresh places by the model: {headline(found)}")
     print(f"  below {world.limit:.0f} m: {sum(one < world.limit for one in low)}, least {min(low):.1f} m;", end=" ")
     print(f"inside a sphere: {sum(one <= 0.0 for one in outside)}, nearest {min(outside):.1f} m outside")
     rows = starts.rows[np.linspace(0, len(starts) - 1, whole).round().astype(int)] if whole else []

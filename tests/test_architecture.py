@@ -24,7 +24,7 @@ CODE = sorted(
     file for folder in (*PACKAGES, "benchmarks", "tests", "examples") for file in (ROOT / folder).rglob("*.py")
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
-# Lines of a function with its docstring: two screens.  Its statements are counted by ruff's PLR0915, its branches by C901.
+# Lines of a function with its docstring: two screens.  Ruff counts its statements by PLR0915, and its branches by C901.
 LONGEST = 80
 # Functions that became longer when signatures and tables lost their `# fmt: skip`: to be split, and not to grow.
 LONGER = {

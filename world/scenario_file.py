@@ -240,23 +240,20 @@ def _spelling_suggestion(parts: Sequence[str | int], model: type[BaseModel] | No
 
 
 def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """Return the known keys of a model's field and of all tables in it, or of the model itself.
+    """Return the known keys of the table at the end of ``parts``, or of the model itself.
 
-    parts: keys that lead to the table; the first one names the model's field.
+    parts: keys and list indices that lead to the table.
     """
-    key_field = model.model_fields.get(str(parts[0])) if parts else None
-    if key_field is None:
-        return list(model.model_fields)
-    tables = [key_field.annotation]
-    keys: list[str] = []
-    # The list grows during the loop, as a table's fields may be tables, in lists and unions.
-    for table_type in tables:
-        tables += [argument for argument in get_args(table_type) if argument not in tables]
-        if isinstance(table_type, type) and issubclass(table_type, BaseModel):
-            keys += table_type.model_fields
-            field_annotations = (field.annotation for field in table_type.model_fields.values())
-            tables += [annotation for annotation in field_annotations if annotation not in tables]
-    return keys
+    tables = [model]
+    for part in parts:
+        # The list grows during the loop, as an annotation may be a list, a union, or both.
+        annotations = [table.model_fields[str(part)].annotation for table in tables if str(part) in table.model_fields]
+        for annotation in annotations:
+            annotations += get_args(annotation)
+        tables_of_part = [kind for kind in annotations if isinstance(kind, type) and issubclass(kind, BaseModel)]
+        # An index or the name of a variant leads to no other table.
+        tables = tables_of_part or tables
+    return [key for table in tables for key in table.model_fields]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:

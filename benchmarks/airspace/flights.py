@@ -1,4 +1,4 @@
-"""Fly default plans among zones and in a band of heights above ground with ArduPlane's law, and count violations.
+"""Fly default plans among zones and in a height band with the model of ArduPlane, and count violations.
 
 ``python -m benchmarks.airspace.flights [--plans N] [--from NUMBER]`` plans the random scenarios of
 `benchmarks.airspace.scenarios`, flies each, and prints the margins of plan and flight, and at the end the numbers of
@@ -20,7 +20,6 @@ from planfly.workflow.pipeline import fly_and_judge
 from planfly.workflow.uav import load_uav
 from world.arrays import Floats
 from world.scenario import Scenario
-from world.scenario_tables import ZoneTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,27 +54,25 @@ def kept_by(scenario: Scenario, position: Floats) -> Kept:
     assert terrain is not None
     assert limits.max_height_m is not None
     over = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    zones = [_kept_of(zone, position, over) for zone in scenario.spec.zones or ()]
+    zones = []
+    for zone in scenario.spec.zones or ():
+        if zone.radius_m is not None:
+            away = np.hypot(position[:, 0] - zone.east_m, position[:, 1] - zone.north_m) - zone.radius_m
+        else:
+            away = ring_distance(np.array(zone.polygon_m), position[:, :2])
+        if zone.kind == "inclusion":
+            zones.append(float(-away.max()))
+            continue
+        if zone.floor_agl_m is not None:
+            away = np.maximum(away, zone.floor_agl_m - over)
+        if zone.ceiling_agl_m is not None:
+            away = np.maximum(away, over - zone.ceiling_agl_m)
+        zones.append(float(away.min()))
     return Kept(
         float(over.min()) - limits.min_clearance_m,
         limits.max_height_m - float(over.max()),
         min(zones, default=math.inf),
     )
-
-
-def _kept_of(zone: ZoneTable, position: Floats, over: Floats) -> float:
-    """Return the smallest distance of positions from one zone, or inside it for an inclusion, m."""
-    if zone.radius_m is not None:
-        away = np.hypot(position[:, 0] - zone.east_m, position[:, 1] - zone.north_m) - zone.radius_m
-    else:
-        away = ring_distance(np.array(zone.polygon_m), position[:, :2])
-    if zone.kind == "inclusion":
-        return float(-away.max())
-    if zone.floor_agl_m is not None:
-        away = np.maximum(away, zone.floor_agl_m - over)
-    if zone.ceiling_agl_m is not None:
-        away = np.maximum(away, over - zone.ceiling_agl_m)
-    return float(away.min())
 
 
 def fly(number: int) -> Flown:

@@ -149,7 +149,15 @@ def passable(scenario: Scenario) -> bool:
     layers = layers[
         (layers > np.nanmin(low) - LAYER) & (layers < np.max(high[np.isfinite(high)], initial=start[2]) + LAYER)
     ]
-    climb, dive = _slopes(scenario)
+    # The smallest climb and dive limits of all courses, reduced by a tenth for turbulence and by half a degree.
+    limits = load_uav(scenario).limits
+    up = float(max(start[2], destination[2])) + 100.0
+    found = np.array([limits.slopes(course, up) for course in np.radians(np.arange(0, 360, 15))])
+    climb, dive = 0.9 * found.min(axis=0) - math.radians(0.5)
+    if limits.tracking is not None:
+        speed = limits.airspeed + scenario.wind.speed
+        climb = min(climb, math.atan(limits.tracking.climb_rate / speed) - math.radians(0.5))
+        dive = min(dive, math.atan(limits.tracking.sink_rate / speed) - math.radians(0.5))
     rises = [(int(pitch * k * math.tan(climb) / LAYER), int(pitch * k * math.tan(dive) / LAYER)) for k in (1.0, 1.414)]
     state = np.zeros((3, across.size, layers.size), dtype=bool)
     state[:, half, np.argmin(np.abs(layers - start[2]))] = True
@@ -160,7 +168,13 @@ def passable(scenario: Scenario) -> bool:
         after = np.zeros_like(state)
         for side in (-1, 0, 1):
             before = state[max(0, side) : min(3, side + 3)].any(axis=0) if side else state.any(axis=0)
-            spread = _climbed(before, *rises[abs(side)])
+            # Layers that a climb or dive over one stage reaches.
+            climbed_layers, dived_layers = rises[abs(side)]
+            spread = before.copy()
+            for step in range(1, climbed_layers + 1):
+                spread[:, step:] |= before[:, :-step]
+            for step in range(1, dived_layers + 1):
+                spread[:, :-step] |= before[:, step:]
             moved = np.zeros_like(spread)
             to, of = slice(max(0, side), across.size + min(0, side)), slice(max(0, -side), across.size - max(0, side))
             moved[to] = spread[of]
@@ -216,33 +230,3 @@ def ring_distance(ring: Floats, places: Floats) -> Floats:
             crossing = a[0] + (places[..., 1] - a[1]) / step[1] * step[0]
         inside ^= spans & (crossing > places[..., 0])
     return np.where(inside, -nearest, nearest)
-
-
-def _slopes(scenario: Scenario) -> tuple[float, float]:
-    """Return the climb and dive limits for all courses, rad.
-
-    They are the smallest limits, reduced by a tenth for turbulence and by half a degree.
-    """
-    limits = load_uav(scenario).limits
-    up = float(max(scenario.start[2], scenario.destination[2])) + 100.0
-    found = np.array([limits.slopes(course, up) for course in np.radians(np.arange(0, 360, 15))])
-    climb, dive = 0.9 * found.min(axis=0) - math.radians(0.5)
-    if limits.tracking is not None:
-        speed = limits.airspeed + scenario.wind.speed
-        climb = min(climb, math.atan(limits.tracking.climb_rate / speed) - math.radians(0.5))
-        dive = min(dive, math.atan(limits.tracking.sink_rate / speed) - math.radians(0.5))
-    return float(climb), float(dive)
-
-
-def _climbed(cells: Flags, climb: int, dive: int) -> Flags:
-    """Return a mask (across, layers) of the layers that a climb or dive over one stage reaches.
-
-    cells: mask of the layers at the start of the stage, (across, layers).
-    climb, dive: number of layers that the stage can climb or dive.
-    """
-    out = cells.copy()
-    for step in range(1, climb + 1):
-        out[:, step:] |= cells[:, :-step]
-    for step in range(1, dive + 1):
-        out[:, :-step] |= cells[:, step:]
-    return out

@@ -7,22 +7,21 @@ different verdicts, and the largest distance between the tracks at the same time
 """
 
 import argparse
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
-from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.verdict import Verdict
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.uav import Uav, load_uav
 from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind
 
+# Compared step rates, Hz.
+STEP_RATES: tuple[Literal[60, 120], ...] = (120, 60)
 # Largest allowed distance of a track from the track at 120 steps a second, m.
 MAX_DIFFERENCE = 0.1
 
@@ -48,9 +47,10 @@ def compare(seed: int, aircraft: str = "aerosonde") -> StepRates:
     made = mission_of(seed, aircraft)
     uav = load_uav(made.scenario)
     setup = make_setup(made.scenario, uav, made.mission, seed=1)
-    judged = [_judged(setup, uav, hz) for hz in (120, 60)]
+    flights = [fly_to_end(Flight(replace(setup, fdm_hz=hz), uav.aircraft)) for hz in STEP_RATES]
+    judged = [judge_flight(setup, flown.track, flown.ended) for flown in flights]
     failed = [{(item.rule, item.place) for item in one.findings if item.ok is False} for one in judged]
-    calm, windy = (_max_distance(_without_gusts(made, speed), uav) for speed in (0.0, made.scenario.wind.speed))
+    calm, windy = (_max_distance(made, uav, speed) for speed in (0.0, made.scenario.wind.speed))
     return StepRates(made.name, (judged[0].flyable, judged[1].flyable), failed[0] == failed[1], calm, windy)
 
 
@@ -68,28 +68,20 @@ def _energy(made: FieldMission) -> float:
     return float(fly_to_end(Flight(make_setup(made.scenario, uav, made.mission, 1), uav.aircraft)).track.energy[-1])
 
 
-def _judged(setup: FlightSetup, uav: Uav, hz: Literal[60, 120]) -> Verdict:
-    """Fly a setup at a step rate, and return the verdict."""
-    flown = fly_to_end(Flight(replace(setup, fdm_hz=hz), uav.aircraft))
-    return judge_flight(setup, flown.track, flown.ended)
+def _max_distance(made: FieldMission, uav: Uav, wind_speed: float) -> float:
+    """Return the largest distance between a mission's flights at both step rates at the same time, m.
 
+    The flights have no gusts and exact navigation. The distance is infinite if the flights ended differently, or differ
+    in length by more than one tick.
 
-def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
-    """Return the setup of a mission without gusts, in a wind of a speed, m/s."""
-    old = made.scenario.wind
-    wind = Wind(speed, old.from_course, old.gradient if speed else 0.0, "none", None, old.reference_amsl)
-    table = made.scenario.spec.wind.model_copy(update={"speed_mps": speed, "turbulence": "none"})
-    scenario: Scenario = replace(made.scenario, wind=wind, spec=made.scenario.spec.model_copy(update={"wind": table}))
-    setup = make_setup(scenario, load_uav(scenario), made.mission, seed=1)
-    return replace(setup, nav="perfect")
-
-
-def _max_distance(setup: FlightSetup, uav: Uav) -> float:
-    """Return the largest distance between the flights at both step rates at the same time, m.
-
-    It is infinite if the flights ended differently, or differ in length by more than one tick.
+    wind_speed: m/s.
     """
-    one, other = (_flown(setup, uav, hz) for hz in (120, 60))
+    old = made.scenario.wind
+    wind = Wind(wind_speed, old.from_course, old.gradient if wind_speed else 0.0, "none", None, old.reference_amsl)
+    table = made.scenario.spec.wind.model_copy(update={"speed_mps": wind_speed, "turbulence": "none"})
+    scenario: Scenario = replace(made.scenario, wind=wind, spec=made.scenario.spec.model_copy(update={"wind": table}))
+    setup = replace(make_setup(scenario, load_uav(scenario), made.mission, seed=1), nav="perfect")
+    one, other = (fly_to_end(Flight(replace(setup, fdm_hz=hz), uav.aircraft)) for hz in STEP_RATES)
     rows = min(len(one.track), len(other.track))
     # The flights may differ by one tick in length.
     if one.ended != other.ended or abs(len(one.track) - len(other.track)) > 1 or not rows:
@@ -97,15 +89,11 @@ def _max_distance(setup: FlightSetup, uav: Uav) -> float:
     return float(np.linalg.norm(one.track.position[:rows] - other.track.position[:rows], axis=1).max())
 
 
-def _flown(setup: FlightSetup, uav: Uav, hz: int) -> SimulatedFlight:
-    """Fly a setup at a step rate."""
-    return fly_to_end(Flight(replace(setup, fdm_hz=cast("Any", hz)), uav.aircraft))
-
-
 def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False) -> dict[str, float]:
     """Compare all missions, and return figures by name."""
     found: list[StepRates] = []
-    for one in _each(seeds, aircraft):
+    for seed in seeds:
+        one = compare(seed, aircraft)
         found.append(one)
         if loud and (not one.same or max(one.calm, one.windy) > MAX_DIFFERENCE):
             print(f"{one.name}: flyable {one.flyable}, same findings {one.same}, {one.calm:.3f}, {one.windy:.3f} m")
@@ -117,12 +105,6 @@ def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False
         "calm: most between the tracks, m": max(one.calm for one in found),
         "wind without gusts: most between the tracks, m": max(one.windy for one in found),
     }
-
-
-def _each(seeds: range, aircraft: str) -> Iterator[StepRates]:
-    """Yield the comparison for each seed."""
-    for seed in seeds:
-        yield compare(seed, aircraft)
 
 
 def main() -> None:

@@ -167,19 +167,6 @@ def _log_likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
     return out
 
 
-def _winds_to_fly(boundary: float, beyond: bool, points: list[dict[str, Any]]) -> list[float]:
-    """Return the winds at which flights show that a boundary is right, m/s: one below it and one above it.
-
-    For a boundary beyond the largest wind of the search there is only a wind below it, and a lower one if too few
-    flights were flyable there.
-    """
-    below = round(max(0.0, boundary - WITHIN), 2)
-    if not beyond:
-        return [below, round(boundary + WITHIN, 2)]
-    there = [one for one in points if one["speed"] == below]
-    return [below, below - 2.0 * WITHIN] if there and not _enough_fly(there) else [below]
-
-
 def main() -> None:
     """Fly the points and store them."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.campaigns.winds_reference")
@@ -199,7 +186,17 @@ def main() -> None:
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     for direction in args.directions:
         points = kept.setdefault(str(direction), [])
-        for speed in _winds_to_fly(*boundaries[direction], points):
+        # Flights in a wind below the boundary and in one above it show that the boundary is right. A boundary beyond
+        # the largest wind of the search has only a wind below it, and a lower one if too few flights were flyable
+        # there.
+        boundary, beyond = boundaries[direction]
+        speeds = [round(max(0.0, boundary - WITHIN), 2)]
+        below = [one for one in points if one["speed"] == speeds[0]]
+        if not beyond:
+            speeds.append(round(boundary + WITHIN, 2))
+        elif below and not _enough_fly(below):
+            speeds.append(speeds[0] - 2.0 * WITHIN)
+        for speed in speeds:
             asked = {"speed": speed, **drawn}
             if any(asked.items() <= one.items() for one in points):
                 continue

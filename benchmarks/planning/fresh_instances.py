@@ -49,18 +49,16 @@ def random_task(seed: int, threats: int = THREATS, family: str = "passable", aut
     if family == "wild":
         scenario = wild_scenario(seed, autopilot)
     else:
-        text = random_scenario(seed, threats) if family == "passable" else _drawn(seed, threats)
+        if family == "passable":
+            text = random_scenario(seed, threats)
+        else:
+            positions, radii = draw_threats(np.random.default_rng([SEED, threats, seed, 0]), threats)
+            text = scenario_text(f"drawn-{threats}-{seed}", Instance(positions, radii, 0), f"drawn instance {seed}")
         flown = text.replace("[flight]\n", f'[flight]\nautopilot = "{autopilot}"\n')
         scenario = scenario_from_spec(parse_scenario(flown, "random"), "random")
     uav = load_uav(scenario)
     problem = make_problem(scenario, uav.limits)
     return Task(scenario, uav, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
-
-
-def _drawn(seed: int, threats: int) -> str:
-    """Return the first draw of a seed as the text of a scenario file."""
-    positions, radii = draw_threats(np.random.default_rng([SEED, threats, seed, 0]), threats)
-    return scenario_text(f"drawn-{threats}-{seed}", Instance(positions, radii, 0), f"drawn instance {seed}")
 
 
 def reference_ratios(names: Sequence[str], tasks: Sequence[Task], kept: Path) -> Floats:

@@ -85,24 +85,17 @@ class Contest:
 
     def certified(self, paths: Floats) -> Floats:
         """Return those 20 certified and safe paths of (n, w, 3) that together have the largest hypervolume."""
-        safe = [path for path in paths if self._is_safe(path)]
+        certificates = [certify(self.task.problem, path) for path in paths]
+        safe = [
+            path
+            for path, certificate in zip(paths, certificates, strict=True)
+            if certificate.ok and certificate.kill_distance > 0.0
+        ]
         if not safe:
             return paths[:0]
         kept = np.array(safe)
         order = covering_order(self.task.objectives(self.task.values(kept)), self.reference, COUNT)
         return np.asarray(kept[order])
-
-    def _is_safe(self, path: Floats) -> bool:
-        """Return True if a path is certified and no missile reaches it."""
-        made = certify(self.task.problem, path)
-        return made.ok and made.kill_distance > 0.0
-
-
-def _scenario(name: str) -> Scenario:
-    """Load or make the scenario of a problem."""
-    kind, _, number = name.partition("-")
-    families = {"random": "passable", "wild": "wild"}
-    return random_task(int(number), family=families[kind]).scenario if kind in families else load_scenario(name)
 
 
 def make_contest(scenario: Scenario, front: Front) -> Contest:
@@ -121,7 +114,9 @@ def make_contest(scenario: Scenario, front: Front) -> Contest:
 
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
     """Plan a front with planfly; return it with its contest and its row."""
-    scenario = _scenario(name)
+    kind, _, number = name.partition("-")
+    families = {"random": "passable", "wild": "wild"}
+    scenario = random_task(int(number), family=families[kind]).scenario if kind in families else load_scenario(name)
     limits = load_uav(scenario).limits.with_margin()
     began = time.process_time()
     front = plan_front(scenario, limits, COUNT, seed=seed)
@@ -130,14 +125,6 @@ def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
     paths = np.array([one.plan.waypoints for one in front.plans])
     evaluations = front.evaluations + front.default.plan.evaluations
     return front, contest, Row(contest.share(paths), len(paths), evaluations, seconds)
-
-
-def _box(contest: Contest, seeds: Floats) -> tuple[Floats, Floats]:
-    """Return the encoding's box, extended to seeds (n, d), which are not bound to the intervals."""
-    low, high = contest.encoding.lower, contest.encoding.upper
-    if not len(seeds):
-        return low, high
-    return np.minimum(low, seeds.min(axis=0)), np.maximum(high, seeds.max(axis=0))
 
 
 def theirs(
@@ -150,7 +137,10 @@ def theirs(
     from pymoo.core.problem import Problem as PymooProblem
 
     task = contest.task
-    low, high = _box(contest, seeds)
+    # Seeds are not bound to the intervals of the encoding.
+    low, high = contest.encoding.lower, contest.encoding.upper
+    if len(seeds):
+        low, high = np.minimum(low, seeds.min(axis=0)), np.maximum(high, seeds.max(axis=0))
     penalised = algorithm == "MOEA/D"
     kept_vectors: list[Floats] = []
     spent = 0
@@ -181,24 +171,17 @@ def theirs(
     # All feasible paths of the search are used, not only its last population.
     if not kept_vectors:
         return Row(0.0, 0, spent, took)
-    paths = _thinned(contest, np.array(kept_vectors))
-    chosen = contest.certified(paths)
-    return Row(contest.share(chosen), len(chosen), spent, took)
-
-
-def _thinned(contest: Contest, vectors: Floats) -> Floats:
-    """Return the paths of vectors (n, d) that contribute most to the hypervolume.
-
-    Five times the required number is returned.
-    """
-    paths = contest.task.to_paths(vectors[-20_000:])
-    objectives = contest.task.objectives(contest.task.values(paths))
-    chosen: list[int] = []
-    # In parts, so that the tables fit in memory.
+    paths = task.to_paths(np.array(kept_vectors)[-20_000:])
+    path_objectives = task.objectives(task.values(paths))
+    # Keep five times the required number, those that contribute most to the hypervolume. They are chosen in parts, so
+    # that the tables fit in memory.
+    covering: list[int] = []
     for first in range(0, len(paths), 2000):
-        chosen += (first + covering_order(objectives[first : first + 2000], contest.reference, 5 * COUNT)).tolist()
-    order = covering_order(objectives[chosen], contest.reference, 5 * COUNT)
-    return np.asarray(paths[np.array(chosen)[order]])
+        part = path_objectives[first : first + 2000]
+        covering += (first + covering_order(part, contest.reference, 5 * COUNT)).tolist()
+    order = covering_order(path_objectives[covering], contest.reference, 5 * COUNT)
+    chosen = contest.certified(np.asarray(paths[np.array(covering)[order]]))
+    return Row(contest.share(chosen), len(chosen), spent, took)
 
 
 def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int) -> Any:
@@ -230,38 +213,7 @@ def measure(name: str, seeds: range, *, whole: bool, alone: bool = True) -> dict
         text = "  ".join(f"{key}: {row.hypervolume:.4f}" for key, row in rows.items())
         spent = f"{mine.evaluations} evaluations, {mine.seconds:.1f} s"
         print(f"  seed {seed}: {len(front.plans)} plans, {spent};  {text}", flush=True)
-    _sum_up(record)
-    return record
-
-
-def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, Row], Front]:
-    """Return the row of each algorithm on a problem with one seed, and planfly's front."""
-    front, contest, mine = ours(name, seed)
-    if not front.plans:
-        return {"planfly": mine}, front
-    own = contest.task.to_vectors(np.array(list(seed_paths(contest.task, np.array(front.default.plan.waypoints)))))
-    start = contest.certified(contest.task.to_paths(own))
-    rows = {"planfly": mine, "our seeds alone": Row(contest.share(start), len(start), len(own), 0.0)}
-    none = own[:0]
-    for algorithm in ("NSGA-II", "MOEA/D"):
-        for suffix, given in [("", none)] * alone + [(" from our seeds", _covering_first(contest, own))]:
-            rows[f"{algorithm}{suffix}, equal CPU"] = theirs(contest, algorithm, seed, None, mine.seconds, given)
-            if algorithm == "NSGA-II" or whole:
-                key = f"{algorithm}{suffix}, equal evaluations"
-                rows[key] = theirs(contest, algorithm, seed, mine.evaluations, None, given)
-    return rows, front
-
-
-def _covering_first(contest: Contest, vectors: Floats) -> Floats:
-    """Return vectors (n, d) in the order of their contributions to the hypervolume, infeasible ones last."""
-    objectives, violations = contest.task.scores(contest.task.to_paths(vectors))
-    met = np.flatnonzero((violations <= 0.0).all(axis=1))
-    first = met[covering_order(objectives[met], contest.reference, len(met))]
-    return np.concatenate([vectors[first], np.delete(vectors, first, axis=0)])
-
-
-def _sum_up(record: dict[str, list[dict[str, Any]]]) -> None:
-    """Print medians, and the ratio of planfly's median to each."""
+    # Medians, and the ratio of planfly's median to each.
     own_share = np.array([row["hypervolume"] for row in record["planfly"]])
     for key, found in record.items():
         shares = np.array([row["hypervolume"] for row in found])
@@ -273,6 +225,31 @@ def _sum_up(record: dict[str, list[dict[str, Any]]]) -> None:
             f"  {key:<36} median {middle:.4f}, least {shares.min():.4f}; ours / this {ratio};"
             f" {none_found} of {len(shares)} without a plan; CPU {seconds:.1f} s"
         )
+    return record
+
+
+def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, Row], Front]:
+    """Return the row of each algorithm on a problem with one seed, and planfly's front."""
+    front, contest, mine = ours(name, seed)
+    if not front.plans:
+        return {"planfly": mine}, front
+    task = contest.task
+    own = task.to_vectors(np.array(list(seed_paths(task, np.array(front.default.plan.waypoints)))))
+    start = contest.certified(task.to_paths(own))
+    rows = {"planfly": mine, "our seeds alone": Row(contest.share(start), len(start), len(own), 0.0)}
+    none = own[:0]
+    # Seeds in the order of their contributions to the hypervolume, infeasible ones last.
+    objectives, violations = task.scores(task.to_paths(own))
+    met = np.flatnonzero((violations <= 0.0).all(axis=1))
+    first = met[covering_order(objectives[met], contest.reference, len(met))]
+    covering_first = np.concatenate([own[first], np.delete(own, first, axis=0)])
+    for algorithm in ("NSGA-II", "MOEA/D"):
+        for suffix, given in [("", none)] * alone + [(" from our seeds", covering_first)]:
+            rows[f"{algorithm}{suffix}, equal CPU"] = theirs(contest, algorithm, seed, None, mine.seconds, given)
+            if algorithm == "NSGA-II" or whole:
+                key = f"{algorithm}{suffix}, equal evaluations"
+                rows[key] = theirs(contest, algorithm, seed, mine.evaluations, None, given)
+    return rows, front
 
 
 def main() -> None:

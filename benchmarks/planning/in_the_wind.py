@@ -16,6 +16,7 @@ import argparse
 import json
 import time
 from dataclasses import asdict, dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ def _by_legs(limits: Limits, table: PerformanceTable, path: Floats) -> tuple[flo
 
 
 def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[str, Any]]:
-    """Fly every mission in one setting, and print a line for each mission."""
+    """Fly every mission in one setting; print a line for each mission, and medians and extremes of the ratios."""
     rows = []
     print(f"\n{name}: ratios to the shortest path")
     for number in range(first, first + count):
@@ -124,23 +125,17 @@ def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[st
             f"   {'; '.join(f'{goal}: {one.wrong[:70]}' for goal, one in flown.items() if one.wrong)}",
             flush=True,
         )
-    _sum_up(rows)
+    for goal, column in (("time", "seconds"), ("energy", "energy")):
+        ratios = np.array([row[goal][column] / row["length"][column] for row in rows])
+        ratios = ratios[np.isfinite(ratios)]
+        low, middle, high = np.min(ratios), np.median(ratios), np.max(ratios)
+        print(f"  {goal} / {goal} of the shortest path: median {middle:.4f}, least {low:.4f}, most {high:.4f}", end="")
+        print(f", of {len(ratios)}; {int((ratios > 1.002).sum())} are more than 1.002")
+    for goal in OBJECTIVES:
+        wrong = sum(row[goal]["wrong"] != "" for row in rows)
+        cpu = float(np.median([row[goal]["cpu"] for row in rows]))
+        print(f"  for {goal}: {wrong} of {len(rows)} not planned or not flyable; plan {cpu:.2f} s of CPU, median")
     return rows
-
-
-def _straight_seconds(scenario: Scenario, limits: Limits, course: float, level: float) -> float:
-    """Return the least time (s) of straight paths that climb, stay level and descend, ignoring obstacles."""
-    table, (climb, dive) = limits.performance(), (np.tan(slope) for slope in limits.slopes(course, level))
-    start, destination = np.array(scenario.start), np.array(scenario.destination)
-    run, least = float(np.hypot(*(destination - start)[:2])), np.inf
-    for top in np.linspace(max(start[2], destination[2]), scenario.ceiling, 20):
-        for share in (0.1, 0.2, 0.35, 0.5, 0.75, 1.0):
-            up, down = (top - start[2]) / (share * climb * run), 1.0 - (top - destination[2]) / (share * dive * run)
-            if up < down:
-                path = start + np.array([0.0, up, down, 1.0])[:, None] * (destination - start)
-                path[1:3, 2] = top
-                least = min(least, _by_legs(limits, table, path)[0])
-    return least
 
 
 def bounds(name: str, first: int, count: int) -> Floats:
@@ -163,27 +158,23 @@ def bounds(name: str, first: int, count: int) -> Floats:
         run, course = float(np.hypot(*step)), float(np.arctan2(*step))
         level = float(0.5 * (scenario.start[2] + scenario.ceiling))
         fastest = run / ground_speed_on(table, course, float(scenario.ceiling))
-        ratios[row] = fastest / seconds, _straight_seconds(scenario, uav.limits, course, level) / seconds
+        # The least time of straight paths that climb, stay level and descend, ignoring obstacles.
+        climb, dive = (np.tan(slope) for slope in uav.limits.slopes(course, level))
+        start, destination, least = np.array(scenario.start), np.array(scenario.destination), np.inf
+        tops = np.linspace(max(start[2], destination[2]), scenario.ceiling, 20)
+        for top, share in product(tops, (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)):
+            up, down = (top - start[2]) / (share * climb * run), 1.0 - (top - destination[2]) / (share * dive * run)
+            if up < down:
+                path = start + np.array([0.0, up, down, 1.0])[:, None] * (destination - start)
+                path[1:3, 2] = top
+                least = min(least, _by_legs(uav.limits, table, path)[0])
+        ratios[row] = fastest / seconds, least / seconds
         detours[row] = plan.objectives[0]
         print(f"  {number}  {ratios[row, 0]:.4f}  {ratios[row, 1]:.4f}  length ratio {detours[row]:.4f}", flush=True)
     middle = np.nanmedian(ratios, axis=0)
     print(f"{name}: no path beats {middle[0]:.4f}, nor a straight one {middle[1]:.4f}, medians of {count}")
     print(f"  shortest path / straight line, median {np.nanmedian(detours):.4f}")
     return ratios
-
-
-def _sum_up(rows: list[dict[str, Any]]) -> None:
-    """Print medians and extremes of the ratios, and how many flights were not flyable."""
-    for goal, column in (("time", "seconds"), ("energy", "energy")):
-        ratios = np.array([row[goal][column] / row["length"][column] for row in rows])
-        ratios = ratios[np.isfinite(ratios)]
-        low, middle, high = np.min(ratios), np.median(ratios), np.max(ratios)
-        print(f"  {goal} / that of the shortest: median {middle:.4f}, least {low:.4f}, most {high:.4f}", end="")
-        print(f", of {len(ratios)}; {int((ratios > 1.002).sum())} are more than 1.002")
-    for goal in OBJECTIVES:
-        wrong = sum(row[goal]["wrong"] != "" for row in rows)
-        cpu = float(np.median([row[goal]["cpu"] for row in rows]))
-        print(f"  for {goal}: {wrong} of {len(rows)} not planned or not flyable; plan {cpu:.2f} s of CPU, median")
 
 
 def main() -> None:

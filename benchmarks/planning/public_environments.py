@@ -15,7 +15,6 @@ turn of more than 105 degrees between two steps of the path is not allowed.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -102,18 +101,17 @@ class Environment:
 
         Each point is ahead of the last one.
         """
-        return np.array([list(self._first_vector(rng)) for _ in range(count)])
-
-    def _first_vector(self, rng: np.random.Generator) -> Iterator[float]:
-        """Yield the variables of one vector of `first_vectors`: east and north of each inner control point."""
-        previous = np.ones(2)
-        for number in range(2, self.control_count):
-            point = np.full(2, -math.inf)
-            while (point < previous).any():
-                along = number * MAP_CELLS / self.control_count
-                point = along + rng.uniform(-FIRST_RANGE_CELLS, FIRST_RANGE_CELLS, 2)
-            previous = point
-            yield from np.clip(point, 1.0, float(MAP_CELLS)).tolist()
+        vectors = np.empty((count, self.control_count - 2, 2))
+        for vector in vectors:
+            previous = np.ones(2)
+            for number in range(2, self.control_count):
+                point = np.full(2, -math.inf)
+                while (point < previous).any():
+                    along = number * MAP_CELLS / self.control_count
+                    point = along + rng.uniform(-FIRST_RANGE_CELLS, FIRST_RANGE_CELLS, 2)
+                previous = point
+                vector[number - 2] = np.clip(point, 1.0, float(MAP_CELLS))
+        return vectors.reshape(count, -1)
 
 
 @cache

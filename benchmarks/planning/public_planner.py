@@ -175,37 +175,30 @@ class PublicPlan:
         axis_east = np.round(np.linspace(1.0, columns - 1.0, max(3, round(columns / spacing))))
         axis_north = np.round(np.linspace(1.0, rows - 1.0, max(3, round(rows / spacing))))
         centres: Floats = np.stack(np.meshgrid(axis_east, axis_north), axis=2).reshape(-1, 2).astype(np.float64)
+        # Paths without regard for the ground, and clear of it: cost, True if clear, and path.
         candidates: list[tuple[float, bool, Floats]] = []
-        for places in (centres, find_highest(centres, ground, int(0.5 * spacing))):
-            candidates += self._search_places(np.insert(places, 2, END_HEIGHT_M, axis=1))
+        for map_places in (centres, find_highest(centres, ground, int(0.5 * spacing))):
+            places = np.insert(map_places, 2, END_HEIGHT_M, axis=1)
+            first, middle, last = (
+                self._legs(froms, tos, MAX_HEIGHT_M - END_HEIGHT_M)
+                for froms, tos in ((self._start, places), (places, places), (places, self._end))
+            )
+            for kind in (0, 1):
+                chain, through = find_cheapest([first[kind], *[middle[kind]] * (WAYPOINT_COUNT - 1), last[kind]])
+                if not np.isfinite(through[0]).any():
+                    continue
+                path = places[chain].copy()
+                if kind == 1:
+                    # Waypoints rise as much as their legs need.
+                    level, raised = (
+                        np.array([first[k][0, chain[0]], *middle[k][chain[:-1], chain[1:]], last[k][chain[-1], 0]])
+                        for k in (0, 1)
+                    )
+                    rises = (raised - level) / HEIGHT_WEIGHT
+                    path[:, 2] += np.maximum(rises[:-1], rises[1:])
+                candidates.append((float(self._costs(self.encode(path)[None])[0]), kind == 1, path))
         _, self.is_clear, path = min(candidates, key=lambda candidate: candidate[:2])
         return path
-
-    def _search_places(self, places: Floats) -> list[tuple[float, bool, Floats]]:
-        """Return two paths (w, 3) through places (n, 3): without regard for the ground, and clear of it.
-
-        Returns the cost of each, True if it is clear, and the path, whose waypoints rise as much as their legs need.
-        """
-        max_rise = MAX_HEIGHT_M - END_HEIGHT_M
-        first, middle, last = (
-            self._legs(froms, tos, max_rise)
-            for froms, tos in ((self._start, places), (places, places), (places, self._end))
-        )
-        candidates = []
-        for kind in (0, 1):
-            chain, through = find_cheapest([first[kind], *[middle[kind]] * (WAYPOINT_COUNT - 1), last[kind]])
-            if not np.isfinite(through[0]).any():
-                continue
-            path = places[chain].copy()
-            if kind == 1:
-                level, raised = (
-                    np.array([first[k][0, chain[0]], *middle[k][chain[:-1], chain[1:]], last[k][chain[-1], 0]])
-                    for k in (0, 1)
-                )
-                rises = (raised - level) / HEIGHT_WEIGHT
-                path[:, 2] += np.maximum(rises[:-1], rises[1:])
-            candidates.append((float(self._costs(self.encode(path)[None])[0]), kind == 1, path))
-        return candidates
 
     def sample(self, path: Floats, count: int, deviation: float) -> Floats:
         """Improve a path (w, 3) by generations of samples of every waypoint, and return the best vector (30,)."""

@@ -23,7 +23,7 @@ from planner.seeding.shortening import resample, shorten_path
 from world.arrays import Floats
 
 # Number of lattice routes.
-WAYS = 400
+ROUTE_COUNT = 400
 # Additional margins with which each route is shortened, m.
 MARGINS = (0.1, 2.0, 5.0)
 # Number of shortest paths that are polished.
@@ -45,8 +45,16 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
 
     Paths closer to missiles than the planner's goal allows count only if all paths are.
     """
-    task = _with_least_margins(task)
-    routes, best = lattice_routes(task, WAYS), (math.inf, None)
+    # Nearly the certificate's margins in the search; the planner's own margins are larger.
+    problem, certified, search = task.problem, task.problem.certified, task.problem.search
+    tight = search._replace(
+        kill_margin=certified.kill_margin + (search.kill_margin - SEARCH_KILL_MARGIN_M) + SPARE,
+        buffer=min(search.buffer, certified.buffer + SPARE),
+        start_buffer=min(search.start_buffer, certified.start_buffer + SPARE),
+        destination_buffer=min(search.destination_buffer, certified.destination_buffer + SPARE),
+    )
+    task = replace(task, problem=replace(problem, search=tight))
+    routes, best = lattice_routes(task, ROUTE_COUNT), (math.inf, None)
     for kill_distance in (required_kill_distance(task.problem), 0.0):
         best = best if best[1] is not None else _best_of_routes(task, routes, kill_distance)
     return best
@@ -80,23 +88,6 @@ def _best_of_routes(task: Task, routes: list[Floats], kill_distance: float) -> t
         if ratio < best[0] and _is_certified(task, shorter, kill_distance):
             best = ratio, shorter
     return best
-
-
-def _with_least_margins(task: Task) -> Task:
-    """Return the task with nearly the certificate's margins in its search.
-
-    The planner's own margins are larger.
-    """
-    problem = task.problem
-    more, certified = SPARE, problem.certified
-    reserve = problem.search.kill_margin - SEARCH_KILL_MARGIN_M
-    tight = problem.search._replace(
-        kill_margin=certified.kill_margin + reserve + more,
-        buffer=min(problem.search.buffer, certified.buffer + more),
-        start_buffer=min(problem.search.start_buffer, certified.start_buffer + more),
-        destination_buffer=min(problem.search.destination_buffer, certified.destination_buffer + more),
-    )
-    return replace(task, problem=replace(problem, search=tight))
 
 
 def _is_certified(task: Task, path: Floats, kill_distance: float) -> bool:

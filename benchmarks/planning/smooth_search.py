@@ -35,7 +35,7 @@ STEPS = 60
 # Shortest leg, m.
 SHORTEST = 25.0
 # Number of lattice routes that are shortened for each problem.
-WAYS = 16
+ROUTE_COUNT = 16
 # Number of plans without grids that are shortened for each problem.
 PLANS = 1
 # Offset of waypoints to the side of a route, m.
@@ -130,7 +130,13 @@ class Programme:
         rows.append(self._on_legs(count, near.legs, (1.0 - share)[:, None] * normal, share[:, None] * normal))
         height, points = self._heights(path, near.ground_legs, near.ground_shares)
         values.append(height)
-        slope = np.column_stack([-self._ground_slope(points), np.ones(len(points))])
+        # Slope of the ground, by central differences.
+        assert self.terrain is not None
+        ground, east, north = self.terrain.height, points[:, 0], points[:, 1]
+        by_east = ground(east + DIFFERENCE, north) - ground(east - DIFFERENCE, north)
+        by_north = ground(east, north + DIFFERENCE) - ground(east, north - DIFFERENCE)
+        ground_slope = np.nan_to_num(np.column_stack([by_east, by_north]) / (2.0 * DIFFERENCE))
+        slope = np.column_stack([-ground_slope, np.ones(len(points))])
         share = near.ground_shares[:, None]
         rows.append(self._on_legs(count, near.ground_legs, (1.0 - share) * slope, share * slope))
         legs, every = np.diff(path, axis=0), np.arange(count)
@@ -164,14 +170,6 @@ class Programme:
         out[rows, legs + 1] += of_second
         return out.reshape(len(legs), 3 * (count + 1))
 
-    def _ground_slope(self, points: Floats) -> Floats:
-        """Return the slope of the ground (n, 2) at points, by central differences."""
-        assert self.terrain is not None
-        east, north = points[:, 0], points[:, 1]
-        by_east = self.terrain.height(east + DIFFERENCE, north) - self.terrain.height(east - DIFFERENCE, north)
-        by_north = self.terrain.height(east, north + DIFFERENCE) - self.terrain.height(east, north - DIFFERENCE)
-        return np.nan_to_num(np.column_stack([by_east, by_north]) / (2.0 * DIFFERENCE))
-
     def shortened(self, path: Floats) -> Floats:
         """Shorten a path (w, 3) with SLSQP."""
         x = path[1:-1].ravel() / UNIT
@@ -203,16 +201,17 @@ def evenly(route: Floats, count: int) -> Floats:
     return np.column_stack([np.interp(at, runs, route[:, axis]) for axis in range(3)])
 
 
-def smooth_search(task: Task, ways: int = WAYS, plans: int = PLANS) -> tuple[float, Floats | None]:
+def smooth_search(task: Task, route_count: int = ROUTE_COUNT, plans: int = PLANS) -> tuple[float, Floats | None]:
     """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one.
 
-    ways: number of lattice routes to shorten, each from waypoints at equal distances and from others next to them.
+    route_count: number of lattice routes to shorten, each from waypoints at equal distances and from others next to
+        them.
     plans: number of plans of the algorithm without grids (`fda`) to shorten, too, for sides that the lattice misses.
     """
     programme, count = Programme(task), task.encoding.waypoints
     rng = np.random.default_rng(1)
     starts = []
-    for route in lattice_routes(task)[:ways]:
+    for route in lattice_routes(task)[:route_count]:
         even = evenly(route, count)
         uneven = even.copy()
         uneven[1:-1, :2] += rng.normal(0.0, BESIDE, (count - 2, 2))

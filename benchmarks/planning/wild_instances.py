@@ -34,9 +34,13 @@ def wild_scenario(number: int, autopilot: str) -> Scenario:
     )
     heights = _ground(peaks, ends) + rng.uniform(*ABOVE, 2)
     radii = float(rng.uniform(0.85, 1.25)) * rng.uniform(0.035, 0.06, THREATS) * length
+    terrain: dict[str, Any] = {"kind": "flat", "amsl_m": 0.0}
+    if count:
+        names = ("east_m", "north_m", "height_m", "sigma_m")
+        terrain = {"kind": "peaks", "peak": [dict(zip(names, peak.tolist(), strict=True)) for peak in peaks]}
     spec: dict[str, Any] = {
         "name": f"wild-{number}",
-        "terrain": _terrain(peaks),
+        "terrain": terrain,
         "area": {
             "east_m": [-half, half],
             "north_m": [-half, half],
@@ -58,14 +62,6 @@ def _ground(peaks: Floats, places: Floats) -> Floats:
     for east, north, height, sigma in peaks:
         total += height * np.exp(-((places[:, 0] - east) ** 2 + (places[:, 1] - north) ** 2) / (2.0 * sigma**2))
     return total
-
-
-def _terrain(peaks: Floats) -> dict[str, Any]:
-    """Return the terrain table of a scenario with some peaks."""
-    if not len(peaks):
-        return {"kind": "flat", "amsl_m": 0.0}
-    names = ("east_m", "north_m", "height_m", "sigma_m")
-    return {"kind": "peaks", "peak": [dict(zip(names, peak.tolist(), strict=True)) for peak in peaks]}
 
 
 def _threats(rng: np.random.Generator, ends: Floats, peaks: Floats, radii: Floats, half: float) -> list[dict[str, Any]]:

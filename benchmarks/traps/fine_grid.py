@@ -11,7 +11,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -67,7 +66,7 @@ def shortest_on_map(scenario: Scenario) -> Floats:
             for share in np.linspace(0.0, 1.0, 2 * max(abs(i), abs(j)) + 1):
                 passes &= _shifted(free, round(share * i), round(share * j))
             begins.append(number[passes])
-            ends.append(_shifted_numbers(number, i, j)[passes])
+            ends.append((number + i * number.shape[1] + j)[passes])
             lengths.append(np.full(len(begins[-1]), PITCH * math.hypot(i, j)))
     table = np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))
     first, last = (int(np.argmin(((grid - end) ** 2).sum(axis=2))) for end in (start, destination))
@@ -79,7 +78,19 @@ def shortest_on_map(scenario: Scenario) -> Floats:
         path.append(int(before[path[-1]]))
     points = grid.reshape(-1, 2)[path[::-1]]
     points[0], points[-1] = start, destination
-    return _taut(scenario, points)
+    # Pull the route taut. Each step is cut into pieces first, so that corners can move.
+    for _ in range(3):
+        dense = np.concatenate([np.linspace(a, b, 9)[:-1] for a, b in pairwise(points)] + [points[-1:]])
+        kept, here = [dense[0]], 0
+        while here < len(dense) - 1:
+            here = next(
+                k
+                for k in range(len(dense) - 1, here, -1)
+                if k == here + 1 or string_is_open(scenario, dense[here], dense[k])
+            )
+            kept.append(dense[here])
+        points = np.array(kept)
+    return points
 
 
 def _shifted(free: Flags, i: int, j: int) -> Flags:
@@ -90,34 +101,6 @@ def _shifted(free: Flags, i: int, j: int) -> Flags:
     c, d = slice(max(0, i), min(rows, rows + i)), slice(max(0, j), min(columns, columns + j))
     out[a, b] = free[c, d]
     return out
-
-
-def _shifted_numbers(number: NDArray[np.int64], i: int, j: int) -> NDArray[np.int64]:
-    """Return the numbers of cells that are shifted by i rows and j columns."""
-    return number + i * number.shape[1] + j
-
-
-def _taut(scenario: Scenario, points: Floats) -> Floats:
-    """Return a route without unnecessary points.
-
-    Each step is cut into pieces first, so that corners can move.
-    """
-    for _ in range(3):
-        dense = np.concatenate([np.linspace(a, b, 9)[:-1] for a, b in pairwise(points)] + [points[-1:]])
-        kept, here = [dense[0]], 0
-        while here < len(dense) - 1:
-            to = next(
-                k for k in range(len(dense) - 1, here, -1) if k == here + 1 or _is_visible(scenario, dense, here, k)
-            )
-            kept.append(dense[to])
-            here = to
-        points = np.array(kept)
-    return points
-
-
-def _is_visible(scenario: Scenario, points: Floats, a: int, b: int) -> bool:
-    """Return True if the line between two points of a route is open."""
-    return string_is_open(scenario, points[a], points[b])
 
 
 def map_length(points: Floats) -> float:

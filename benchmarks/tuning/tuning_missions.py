@@ -68,7 +68,12 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
     # Periods without a common factor, so that all combinations occur.
     tight, hz = number % 3 == 2, 30 if number % 5 == 3 else 60
     turbulence = TURBULENCE[(number // 2) % len(TURBULENCE)]
-    known = _variations(aircraft)
+    # Stronger surfaces show how near a loop is to its stability limit. The Cessna's variation of mass changes its climb
+    # as much as two tenths change the Aerosonde's climb.
+    known: tuple[Variation | None, ...] = (None, Variation(mass=0.95), Variation(mass=1.05))
+    if aircraft.name == "aerosonde":
+        masses = (Variation(mass=0.9), Variation(mass=1.1, drag=1.3))
+        known = (None, Variation(control=0.75), Variation(control=1.4), *masses)
     variation = known[(number // 3) % len(known)]
     # Half of the legs at the steepest slope: turns with a change of slope are the hardest.
     slopes = np.clip(2.0 * random.uniform(*steepest, size=LEGS), *steepest)
@@ -81,8 +86,13 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
 
     def made(lengths: Floats, climbed: Floats) -> FlightSetup:
         """Make the setup of legs with these lengths, m, and slopes, rad."""
+        waypoints = [np.array([0.0, 0.0, START_AMSL])]
+        for course, slope, run in zip(courses, climbed, lengths, strict=True):
+            # A leg that begins below `LOW` climbs, at most at the steepest climb, to stay above the ground.
+            up = min(abs(slope), steepest[1]) if waypoints[-1][2] < LOW else slope
+            waypoints.append(waypoints[-1] + run * np.array([math.sin(course), math.cos(course), math.tan(up)]))
         return make(
-            _way(courses, climbed, lengths, steepest[1]),
+            np.array(waypoints),
             speeds=speeds.tolist(),
             seed=seed * 10_000 + number,
             wind=wind,
@@ -99,26 +109,3 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
         runs[[0, -1]] += scale * OPEN_LEGS[0]
     setup = replace(made(runs, slopes), guidance_hz=cast("Any", hz))
     return Case(setup, variation, not tight)
-
-
-def _way(courses: Floats, slopes: Floats, runs: Floats, climb: float) -> Floats:
-    """Return the waypoints (w, 3) of these legs.
-
-    A leg that begins below `LOW` climbs, at most at the angle `climb` (rad), to stay above the ground.
-    """
-    waypoints = [np.array([0.0, 0.0, START_AMSL])]
-    for course, slope, run in zip(courses, slopes, runs, strict=True):
-        up = min(abs(slope), climb) if waypoints[-1][2] < LOW else slope
-        waypoints.append(waypoints[-1] + run * np.array([math.sin(course), math.cos(course), math.tan(up)]))
-    return np.array(waypoints)
-
-
-def _variations(aircraft: Aircraft) -> tuple[Variation | None, ...]:
-    """Return variations of the aircraft; stronger surfaces show how near a loop is to its stability limit."""
-    if aircraft.name == "aerosonde":
-        return (
-            *(None, Variation(control=0.75), Variation(control=1.4)),
-            *(Variation(mass=0.9), Variation(mass=1.1, drag=1.3)),
-        )
-    # The Cessna's variation of mass changes its climb as much as two tenths change the Aerosonde's climb.
-    return (None, Variation(mass=0.95), Variation(mass=1.05))

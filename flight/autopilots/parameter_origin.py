@@ -159,7 +159,15 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
         header = PX4 if "px4" in stack[1].lower() else ARDUPILOT if re.search("ardu|apm", stack[1], re.I) else ""
     elif program is not None:
         header = ARDUPILOT
-    names = {PX4: _select_names(entries, _PX4_NAMES.fullmatch), ARDUPILOT: _select_names(entries, _is_ardupilot_name)}
+    # Names that look like parameters of PX4, and those that look like parameters of any ArduPilot vehicle.
+    px4_names = _select_names(entries, _PX4_NAMES.fullmatch)
+    patterns = (_ARDUPLANE_NAMES, _ARDUPILOT_NAMES, *_ARDUPILOT_VEHICLES.values())
+    ardupilot_names = [
+        name
+        for name in entries
+        if not _PX4_NAMES.fullmatch(name) and any(pattern.fullmatch(name) for pattern in patterns)
+    ]
+    names = {PX4: px4_names, ARDUPILOT: ardupilot_names}
     votes = {autopilot: len(names[autopilot]) + (_HEADER_WEIGHT if autopilot == header else 0) for autopilot in TITLES}
     winner = max(TITLES, key=lambda autopilot: votes[autopilot])
     min_votes = min(votes.values())
@@ -183,12 +191,6 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
 def _select_names(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
     """Return those of ``names`` for which ``matches`` returns True, or a match of a pattern."""
     return [name for name in names if matches(name)]
-
-
-def _is_ardupilot_name(name: str) -> bool:
-    """Return True if a name looks like a parameter of ArduPilot, for any vehicle."""
-    patterns = (_ARDUPLANE_NAMES, _ARDUPILOT_NAMES, *_ARDUPILOT_VEHICLES.values())
-    return not _PX4_NAMES.fullmatch(name) and any(pattern.fullmatch(name) for pattern in patterns)
 
 
 def _header_vehicle(text: str) -> str | None:

@@ -96,8 +96,14 @@ def make_point_mass(
     has_power = bool(envelope.power_level.size)
     power = np.full((3, len(speeds), len(_ALTITUDES_M)), np.nan)
     if has_power:
-        power_tables = (envelope.power_idle, envelope.power_level, envelope.power_full)
-        power = np.stack([_resample_power(envelope, table, speeds) for table in power_tables])
+        # Interpolate the envelope's tables to the grid of airspeeds and altitudes; beyond an edge of a table, the value
+        # at the edge applies.
+        for grid, table in zip(power, (envelope.power_idle, envelope.power_level, envelope.power_full), strict=True):
+            filled = np.array(table)
+            for column in filled.T:
+                _fill_gaps(column)
+            by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
+            grid[:] = [np.interp(_ALTITUDES_M, envelope.amsl, row) for row in by_speed]
     record: Record = np.zeros(1, POINT_MASS)[0]
     record.airspeed, record.first_airspeed, record.has_power = airspeed, speeds[0], has_power
     record.airspeed_step, record.altitude_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
@@ -211,18 +217,6 @@ def _fill_gaps(values: Floats) -> None:
     is_known = ~np.isnan(values)
     if is_known.any():
         values[:] = np.interp(np.arange(len(values)), np.flatnonzero(is_known), values[is_known])
-
-
-def _resample_power(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
-    """Interpolate a table of the envelope to the grid's airspeeds (v,) and altitudes (h,), (v, h).
-
-    Beyond an edge of the table, the value at the edge applies.
-    """
-    filled = np.array(table)
-    for column in filled.T:
-        _fill_gaps(column)
-    by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
-    return np.stack([np.interp(_ALTITUDES_M, envelope.amsl, row) for row in by_speed])
 
 
 @inner

@@ -122,6 +122,14 @@ class CompiledModel:
             for field, name in _CONTACT_FIELDS.items()
         ]
         self.frames: Records = self.numbers[:FRAME_NUMBERS].view(FRAME)
+        # Registers of the fields of the state; the zero for a quantity that the aircraft lacks.
+        state_registers = []
+        for field in reads:
+            if field in STATE_PROPERTIES:
+                name = STATE_PROPERTIES[field][0]
+            else:
+                name = fdm.aircraft.model.readings[MODEL_FIELDS.index(field)].name
+            state_registers.append(self._register(name) if name else zero_register)
         # The code is the header, then the sections in order.
         forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
         sections = (
@@ -129,7 +137,7 @@ class CompiledModel:
             program.aero,
             program.external,
             forces,
-            [self._state_register(field, zero_register) for field in reads],
+            state_registers,
             writes,
         )
         bounds = accumulate(map(len, sections), initial=CODE_HEADER)
@@ -183,16 +191,6 @@ class CompiledModel:
         if name not in self.properties:
             raise UnsupportedModel(f"property {name}")
         return self.properties[name]
-
-    def _state_register(self, field: str, zero_register: int) -> int:
-        """Return the register of a field of the state.
-
-        For a quantity that the aircraft lacks it is ``zero_register``.
-        """
-        if field in STATE_PROPERTIES:
-            return self._register(STATE_PROPERTIES[field][0])
-        name = self._fdm.aircraft.model.readings[MODEL_FIELDS.index(field)].name
-        return self._register(name) if name else zero_register
 
     def _copy_state(self) -> None:
         """Copy the state and the constants of the JSBSim instance to the frame and the registers."""

@@ -63,8 +63,13 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         "motor_braking": motor_braking,
         "jsbsim": JSBSIM_VERSION,
     }
-    tables = _read_cache_file(file, key, _grid_airspeeds(aircraft))
-    if tables is None:
+    airspeeds = _grid_airspeeds(aircraft)
+    grid = (airspeeds.size, _GRID_AMSL_M.size)
+    shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
+    tables = read_tables(file, key, {name: shapes.get(name, _GRID_AMSL_M.shape) for name in _TABLE_NAMES})
+    if tables is None or not (
+        np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _GRID_AMSL_M)
+    ):
         tables = compute_tables(aircraft, motor_braking)
         write_tables(file, key, tables)
     uncertainty = read_uncertainty(aircraft.folder)
@@ -107,7 +112,23 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     Raises FlightError for a model whose elevator or throttle has no effect, because it has no trims.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)
-    _check_commands(fdm)
+    # Elevator and throttle must change an acceleration.
+    fdm.move_to(0.0)
+    values = fdm.first_guess()
+    for name, limit in (("elevator", fdm.surface_limits()[0]), ("throttle", 1.0)):
+        index = QUANTITIES.index(name)
+        accelerations = []
+        for command in (0.5 * limit, limit):
+            values[index] = command
+            accelerations.append(fdm.apply_trim(values))
+        if float(np.abs(accelerations[1] - accelerations[0]).max()) < _MIN_RESPONSE:
+            property_name = aircraft.model.commands[index - QUANTITIES.index("elevator")].name
+            raise FlightError(
+                f"{aircraft.model_file}: the {name} command {property_name} has no effect: it changes no force and no"
+                " moment, so level flight cannot be trimmed",
+                file=aircraft.model_file,
+                field=f"model.command.{name}",
+            )
     airspeeds = _grid_airspeeds(aircraft)
     climb = np.full((airspeeds.size, _GRID_AMSL_M.size), math.nan)
     descent = climb.copy()
@@ -142,26 +163,6 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     }
 
 
-def _check_commands(fdm: Fdm) -> None:
-    """Raise FlightError if the elevator or the throttle of a model does not change any acceleration."""
-    fdm.move_to(0.0)
-    values = fdm.first_guess()
-    for name, limit in (("elevator", fdm.surface_limits()[0]), ("throttle", 1.0)):
-        index = QUANTITIES.index(name)
-        accelerations = []
-        for command in (0.5 * limit, limit):
-            values[index] = command
-            accelerations.append(fdm.apply_trim(values))
-        if float(np.abs(accelerations[1] - accelerations[0]).max()) < _MIN_RESPONSE:
-            property_name = fdm.aircraft.model.commands[index - QUANTITIES.index("elevator")].name
-            raise FlightError(
-                f"{fdm.aircraft.model_file}: the {name} command {property_name} has no effect: it changes no force and"
-                " no moment, so level flight cannot be trimmed",
-                file=fdm.aircraft.model_file,
-                field=f"model.command.{name}",
-            )
-
-
 def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tuple[float, float]:
     """Return the lowest and the highest airspeed of level flight at an altitude, m/s; NaN if not found.
 
@@ -194,18 +195,6 @@ def _grid_airspeeds(aircraft: Aircraft) -> Floats:
     They extend from the stall speed to 5 m/s above the maximum commanded airspeed; both speeds are rounded up.
     """
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
-
-
-def _read_cache_file(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
-    """Return the tables in a cache file; None if the file is incomplete, damaged or for another key."""
-    grid = (airspeeds.size, _GRID_AMSL_M.size)
-    shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
-    tables = read_tables(file, key, {name: shapes.get(name, _GRID_AMSL_M.shape) for name in _TABLE_NAMES})
-    if tables is None:
-        return None
-    if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _GRID_AMSL_M)):
-        return None
-    return tables
 
 
 # ----------------------------------------------------------------------

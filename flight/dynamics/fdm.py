@@ -137,16 +137,9 @@ def load_model(
     if not loaded:
         reason = jsbsim_reason(read_output()) or "no reason is given"
         raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model: {reason}", file=aircraft.model_file)
-    _check_mass(instance, aircraft)
-
-
-def _check_mass(instance: Any, aircraft: Aircraft) -> None:
-    """Raise FlightError if the stated mass differs from the mass of the model, fuel included."""
-    has_property = instance.get_property_manager().hasNode
-    tank_properties = itertools.takewhile(
-        has_property, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count())
-    )
     # JSBSim adds the fuel's mass when it first runs.
+    tanks = (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count())
+    tank_properties = itertools.takewhile(instance.get_property_manager().hasNode, tanks)
     pounds = sum(map(instance.get_property_value, tank_properties), instance.get_property_value("inertia/weight-lbs"))
     mass = pounds * POUND
     if not abs(aircraft.mass - mass) <= MASS_TOLERANCE * mass:
@@ -264,7 +257,19 @@ class Fdm:
             self._exec.set_property_value("atmosphere/override/density", FLAT_DENSITY / SLUG_FT3)
         access.set("simulation/gravity-model", 0.0 if flat_earth else 1.0)
         access.set_optional("motor/braking", float(motor_braking), 0.0)
-        _apply_variation(access, aircraft, variation or Variation())
+        variation = variation or Variation()
+        if variation.mass != 1.0:
+            extra_mass = (variation.mass - 1.0) * aircraft.mass
+            point_mass = access.getter("inertia/pointmass-weight-lbs")()
+            access.set("inertia/pointmass-weight-lbs", point_mass + extra_mass / POUND)
+        access.set_optional("aero/drag-factor", variation.drag, 1.0)
+        access.set_optional("aero/control-factor", variation.control, 1.0)
+        if variation.parasite_drag is not None:
+            access.set("aero/parasite-drag", variation.parasite_drag)
+        if variation.volts != 1.0:
+            access.set("motor/battery-v", variation.volts * aircraft.battery_voltage)
+        for name, value in variation.properties:
+            access.set(name, value)
         readings = zip(MODEL_FIELDS, aircraft.model.readings, strict=True)
         properties = STATE_PROPERTIES | {field: (reading.name, reading.factor) for field, reading in readings}
         self._state_getters = [access.getter(properties[field][0]) for field in _STATE_FIELDS]
@@ -529,19 +534,3 @@ class Fdm:
             self._engine.settle(spin=settle)
             self._exec.run_ic()
         return np.array([getter() for getter in self._rate_getters]) * RATE_FACTORS
-
-
-def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:
-    """Set the properties of a model that a variation states. Raises FlightError for an undefined property."""
-    if variation.mass != 1.0:
-        extra_mass = (variation.mass - 1.0) * aircraft.mass
-        point_mass = properties.getter("inertia/pointmass-weight-lbs")()
-        properties.set("inertia/pointmass-weight-lbs", point_mass + extra_mass / POUND)
-    properties.set_optional("aero/drag-factor", variation.drag, 1.0)
-    properties.set_optional("aero/control-factor", variation.control, 1.0)
-    if variation.parasite_drag is not None:
-        properties.set("aero/parasite-drag", variation.parasite_drag)
-    if variation.volts != 1.0:
-        properties.set("motor/battery-v", variation.volts * aircraft.battery_voltage)
-    for name, value in variation.properties:
-        properties.set(name, value)

@@ -167,7 +167,12 @@ def _contact_force(
     strut_force = 0.0 if strut_force > 0.0 else strut_force
     normal_force = strut_force / upward[2] if contact.is_wheel else -strut_force
     force = transform(axes, (0.0, 0.0, normal_force))
-    moment = cross(_moment_arm(frame, contact, displacement), force)
+    # The moment arm about the center of gravity, ft, in body axes; computed in JSBSim's structural frame (inches), to
+    # reproduce JSBSim's rounding.
+    position, centre, inches_per_foot = contact.position, frame.centre, 1.0 / _INCH
+    x, y = position[0] + -inches_per_foot * displacement[0], position[1] + inches_per_foot * displacement[1]
+    z = position[2] + -inches_per_foot * displacement[2]
+    moment = cross((_INCH * (centre[0] - x), _INCH * (y - centre[1]), _INCH * (centre[2] - z)), force)
     return (
         force,
         moment,
@@ -175,20 +180,6 @@ def _contact_force(
             contact, axes, ground_velocity, normal_force, contact_arm, frictions, contact_index, friction_count
         ),
     )
-
-
-@inlined
-def _moment_arm(frame: Record, contact: Record, displacement: Vector) -> Vector:
-    """Return the moment arm of a contact about the center of gravity, ft, in body axes.
-
-    The arm is computed in JSBSim's structural frame (inches), to reproduce JSBSim's rounding.
-
-    displacement: displacement of the contact by its compression, ft, in body axes.
-    """
-    position, centre, inches_per_foot = contact.position, frame.centre, 1.0 / _INCH
-    x, y = position[0] + -inches_per_foot * displacement[0], position[1] + inches_per_foot * displacement[1]
-    z = position[2] + -inches_per_foot * displacement[2]
-    return _INCH * (centre[0] - x), _INCH * (y - centre[1]), _INCH * (centre[2] - z)
 
 
 @inner

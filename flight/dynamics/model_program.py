@@ -175,7 +175,25 @@ def translate(model: bytes) -> ModelProgram:
         raise UnsupportedModel(f"<{sections['propulsion'][0].tag}> in <propulsion>")
     if missing := [name for name in _SECTIONS if name not in sections]:
         raise UnsupportedModel(f"a model without <{missing[0]}>")
-    contacts = [_parse_contact(element, index) for index, element in enumerate(sections.get("ground_reactions", ()))]
+    # Properties of the contacts except their positions, which are read from JSBSim.
+    contacts = []
+    for index, element in enumerate(sections.get("ground_reactions", ())):
+        kind = element.get("type", "")
+        if element.tag != "contact" or kind not in ("BOGEY", "STRUCTURE"):
+            raise UnsupportedModel(f"<{element.tag} type={kind!r}> in <ground_reactions>")
+        known_tags = {"location", *_CONTACT_NUMBERS, *_REQUIRED_CONTACT_VALUES}
+        _check_element(element, attributes={"type", "name"}, children=known_tags)
+        values = []
+        for name, (unit, factor) in _CONTACT_NUMBERS.items():
+            child = element.find(name)
+            if child is None or child.get("unit") != unit:
+                raise UnsupportedModel(f"<contact> without <{name}> in the unit {unit}")
+            values.append(_element_number(child, attributes={"unit"}) * factor)
+        for name, value in _REQUIRED_CONTACT_VALUES.items():
+            if element.findtext(name, value).strip() != value:
+                raise UnsupportedModel(f"<{name}> {element.findtext(name)}")
+        is_wheel = kind == "BOGEY"
+        contacts.append(ContactData(f"{'gear' if is_wheel else 'contact'}/unit[{index}]", is_wheel, *values))
     if len(contacts) > MAX_CONTACTS:
         raise UnsupportedModel(f"{len(contacts)} contacts")
     return _Translator([sections[name] for name in _SECTIONS], contacts).make_program()
@@ -276,7 +294,20 @@ class _Translator:
             )
             return source if target is None else self._emit(Operation.PRODUCT, [source], target)
         if tag == "table":
-            return self._translate_table(element, target)
+            # Only a table of one variable is supported.
+            _check_element(element, children={"independentVar", "tableData"})
+            variables, data = element.findall("independentVar"), element.findall("tableData")
+            if len(variables) != 1 or len(data) != 1:
+                raise UnsupportedModel("a table of more than one variable")
+            _check_element(variables[0], attributes={"lookup"})
+            _check_element(data[0])
+            numbers = [_parse_number(data[0], number) for number in _element_text(data[0]).split()]
+            keys, lookup = numbers[::2], variables[0].get("lookup", "row")
+            if lookup != "row" or len(numbers) % 2 or len(keys) < 2 or keys != sorted(set(keys)):
+                raise UnsupportedModel("a table whose rows are not pairs with growing keys")
+            first_register = self._append_registers(*numbers)
+            variable = self._read_property(_element_text(variables[0]))
+            return self._emit(Operation.TABLE, [variable, first_register, len(keys)], target)
         if tag not in _OPERATIONS:
             raise UnsupportedModel(f"operation <{tag}>")
         _check_element(element, children=_VALUES)
@@ -293,28 +324,6 @@ class _Translator:
         if name not in self.properties:
             raise UnsupportedModel(f"property {name}")
         return self.properties[name]
-
-    def _translate_table(self, element: Element, target: int | None) -> int:
-        """Translate a table of one variable; return the register of its value.
-
-        Raises UnsupportedModel for any other table.
-
-        target: register of the value; None for a new register.
-        """
-        _check_element(element, children={"independentVar", "tableData"})
-        variables, data = element.findall("independentVar"), element.findall("tableData")
-        if len(variables) != 1 or len(data) != 1:
-            raise UnsupportedModel("a table of more than one variable")
-        _check_element(variables[0], attributes={"lookup"})
-        _check_element(data[0])
-        numbers = [_parse_number(data[0], number) for number in _element_text(data[0]).split()]
-        keys = numbers[::2]
-        if variables[0].get("lookup", "row") != "row" or len(numbers) % 2 or len(keys) < 2 or keys != sorted(set(keys)):
-            raise UnsupportedModel("a table whose rows are not pairs with growing keys")
-        first_register = self._append_registers(*numbers)
-        return self._emit(
-            Operation.TABLE, [self._read_property(_element_text(variables[0])), first_register, len(keys)], target
-        )
 
     def _translate_function(self, element: Element, *, may_have_name: bool = True, target: int | None = None) -> int:
         """Translate a function; return the register of its value.
@@ -338,44 +347,33 @@ class _Translator:
             _check_element(channel, attributes={"name"}, children={*_COMPONENTS, *_DECLARATIONS})
             for component in channel:
                 if component.tag == "actuator":
-                    self._translate_actuator(component)
+                    # One input, which may have a lag, a rate limit and position limits.
+                    known_tags = {"input", "lag", "rate_limit", "clipto", "description"}
+                    _check_element(component, attributes={"name"}, children=known_tags)
+                    inputs = [self._read_property(_element_text(child)) for child in component.findall("input")]
+                    if len(inputs) != 1:
+                        raise UnsupportedModel(f"<actuator> of {len(inputs)} inputs")
+                    lag_element, rate_element = component.find("lag"), component.find("rate_limit")
+                    lag = math.nan if lag_element is None else _element_number(lag_element)
+                    rate = math.inf if rate_element is None else _element_number(rate_element)
+                    lower, upper = _clip_limits(component) or (-math.inf, math.inf)
+                    # The factors depend on the time step, and the memory on the start of the flight.
+                    first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
+                    self.actuators.append(ActuatorBlock(first_register, inputs[0], lag, rate))
+                    output = self._property_register(_component_property(component))
+                    self._emit(Operation.ACTUATOR, [inputs[0], first_register], output)
                 elif component.tag == "fcs_function":
-                    self._translate_fcs_function(component)
-
-    def _translate_actuator(self, element: Element) -> None:
-        """Translate an actuator with one input, which may have a lag, a rate limit and position limits."""
-        _check_element(element, attributes={"name"}, children={"input", "lag", "rate_limit", "clipto", "description"})
-        inputs = [self._read_property(_element_text(child)) for child in element.findall("input")]
-        if len(inputs) != 1:
-            raise UnsupportedModel(f"<actuator> of {len(inputs)} inputs")
-        lag, rate_limit = element.find("lag"), element.find("rate_limit")
-        lower, upper = _clip_limits(element) or (-math.inf, math.inf)
-        # The factors depend on the time step, and the memory on the start of the flight.
-        first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
-        self.actuators.append(
-            ActuatorBlock(
-                first_register,
-                inputs[0],
-                math.nan if lag is None else _element_number(lag),
-                math.inf if rate_limit is None else _element_number(rate_limit),
-            )
-        )
-        self._emit(
-            Operation.ACTUATOR, [inputs[0], first_register], self._property_register(_component_property(element))
-        )
-
-    def _translate_fcs_function(self, element: Element) -> None:
-        """Translate a function of the flight controls, which may have limits."""
-        _check_element(element, attributes={"name"}, children={"function", "clipto", "description"})
-        functions, limits = element.findall("function"), _clip_limits(element)
-        if len(functions) != 1:
-            raise UnsupportedModel(f"<fcs_function> of {len(functions)} functions")
-        output = self._property_register(_component_property(element))
-        if limits is None:
-            self._translate_function(functions[0], may_have_name=False, target=output)
-        else:
-            value = self._translate_function(functions[0], may_have_name=False)
-            self._emit(Operation.CLIP, [value, *map(self._constant_register, limits)], output)
+                    # One function, which may have limits.
+                    _check_element(component, attributes={"name"}, children={"function", "clipto", "description"})
+                    functions, limits = component.findall("function"), _clip_limits(component)
+                    if len(functions) != 1:
+                        raise UnsupportedModel(f"<fcs_function> of {len(functions)} functions")
+                    output = self._property_register(_component_property(component))
+                    if limits is None:
+                        self._translate_function(functions[0], may_have_name=False, target=output)
+                    else:
+                        value = self._translate_function(functions[0], may_have_name=False)
+                        self._emit(Operation.CLIP, [value, *map(self._constant_register, limits)], output)
 
     # Forces.
 
@@ -433,33 +431,6 @@ _CONTACT_NUMBERS = {
 }
 # Required values of elements that a contact may have: no contact steers, brakes or retracts.
 _REQUIRED_CONTACT_VALUES = {"max_steer": "0", "brake_group": "NONE", "retractable": "0"}
-
-
-def _parse_contact(element: Element, contact_index: int) -> ContactData:
-    """Return the properties of a contact except its position, which is read from JSBSim.
-
-    element: <contact> of <ground_reactions>.
-    contact_index: number of the contact in this element.
-
-    Raises UnsupportedModel for a contact with properties that the compiled model lacks.
-    """
-    kind = element.get("type", "")
-    if element.tag != "contact" or kind not in ("BOGEY", "STRUCTURE"):
-        raise UnsupportedModel(f"<{element.tag} type={kind!r}> in <ground_reactions>")
-    _check_element(
-        element, attributes={"type", "name"}, children={"location", *_CONTACT_NUMBERS, *_REQUIRED_CONTACT_VALUES}
-    )
-    values = []
-    for name, (unit, factor) in _CONTACT_NUMBERS.items():
-        child = element.find(name)
-        if child is None or child.get("unit") != unit:
-            raise UnsupportedModel(f"<contact> without <{name}> in the unit {unit}")
-        values.append(_element_number(child, attributes={"unit"}) * factor)
-    for name, value in _REQUIRED_CONTACT_VALUES.items():
-        if element.findtext(name, value).strip() != value:
-            raise UnsupportedModel(f"<{name}> {element.findtext(name)}")
-    is_wheel = kind == "BOGEY"
-    return ContactData(f"{'gear' if is_wheel else 'contact'}/unit[{contact_index}]", is_wheel, *values)
 
 
 # Components of a channel.

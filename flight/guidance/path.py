@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.mission.items import LANDINGS, PLACES, TAKEOFFS, Command, Mission, MissionItem
+from flight.mission.items import LANDINGS, PLACES, TAKEOFFS, Command, Mission
 from flight.mission.itinerary import pass_by_distance, stated_loiter
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
@@ -244,7 +244,11 @@ def fly_by_path(
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.positions
-    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, fly_over_turn)
+    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), signed_turns(points)
+    if fly_over_turn == "long":
+        # A reversal turns to the other side, by more than 180 degrees.
+        corners = reversals(route) - 1
+        turns[corners] -= np.copysign(2.0 * math.pi, turns[corners])
     tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, leg_lengths, turns)
     return_lengths *= fly_over_turn != "none"
     pieces: list[tuple[float, ...]] = []
@@ -300,18 +304,6 @@ def reversals(route: Route) -> NDArray[np.int64]:
     """
     turns = np.concatenate([[0.0], np.abs(signed_turns(route.positions)), [0.0]])
     return np.flatnonzero(route.fly_over & (turns > math.pi - REVERSAL_SIDE_TOLERANCE_RAD))
-
-
-def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
-    """Return the turn at each waypoint but the first and last, rad, positive to the right, (w - 2,).
-
-    fly_over_turn: with "long" a reversal turns to the other side, by more than 180 degrees; see `fly_by_path`.
-    """
-    turns = signed_turns(route.positions)
-    if fly_over_turn == "long":
-        corners = reversals(route) - 1
-        turns[corners] -= np.copysign(2.0 * math.pi, turns[corners])
-    return turns
 
 
 def _ground_following_corners(
@@ -471,7 +463,18 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     waypoints["min_ground_speed"] = np.nan_to_num(points["min_ground_speed"])
     waypoints["item"], waypoints["stop"] = points["item"], points["stop"]
     _set_circles(waypoints[1:-1], route)
-    _set_loiters(waypoints, items)
+    # The end condition of each loiter.
+    waypoints["loiter_time"] = math.nan
+    for k in np.flatnonzero(waypoints["loiter_radius"]).tolist():
+        item = items.get(int(waypoints["item"][k]))
+        loiter = None if item is None else stated_loiter(item)
+        if loiter is not None:
+            waypoints["exits_on_tangent"][k] = loiter.exits_on_tangent
+            waypoints["loiter_turns"][k] = loiter.turns
+            if not loiter.turns:
+                waypoints["loiter_time"][k] = math.inf if loiter.endless else loiter.seconds
+                waypoints["loiters_to_altitude"][k] = loiter.to_altitude
+                waypoints["exits_on_course"][k] = loiter.exits_on_course
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["is_gate"] = np.isin(route.items, gates)
     waypoints["is_mission_end"][-1] = mission is not None and ends_at_plain_waypoint(route, mission)
@@ -500,24 +503,17 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
                 is_loiter = waypoints["stop"] == waypoints["stop"][last_before_return]
                 waypoints["exit_bearing"][is_loiter] = bearing % (2.0 * math.pi) or 2.0 * math.pi
         waypoints["turn"][last_before_return] = turn
-    _set_landing(waypoints, mission)
+    if mission is not None:
+        # The waypoint before a landing, and those of a landing sequence, as `MissionBase::isLanding` of PX4 defines it.
+        flown_commands = PLACES | TAKEOFFS | LANDINGS
+        flown_items = [item for item in mission.items if item.command in flown_commands and item.has_position]
+        last_items = [item.seq for item, next_item in pairwise(flown_items) if next_item.command in LANDINGS]
+        waypoints["precedes_landing"] = np.isin(waypoints["item"], last_items)
+        first_seq = next((item.seq for item in mission.items if item.command == Command.DO_LAND_START), math.inf)
+        landing_items = [item for item in flown_items if item.seq > first_seq][1:]
+        plain_items = [item.seq for item in landing_items if item.command == Command.NAV_WAYPOINT]
+        waypoints["ignores_altitude"] = np.isin(waypoints["item"], plain_items)
     return waypoints
-
-
-def _set_landing(waypoints: Records, mission: Mission | None) -> None:
-    """Mark the waypoint before a landing, and the waypoints of a landing sequence.
-
-    A landing sequence is defined by `MissionBase::isLanding` of PX4.
-    """
-    if mission is None:
-        return
-    flown_items = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
-    last_items = [item.seq for item, next_item in pairwise(flown_items) if next_item.command in LANDINGS]
-    waypoints["precedes_landing"] = np.isin(waypoints["item"], last_items)
-    first_seq = next((item.seq for item in mission.items if item.command == Command.DO_LAND_START), math.inf)
-    landing_items = [item for item in flown_items if item.seq > first_seq][1:]
-    plain_items = [item.seq for item in landing_items if item.command == Command.NAV_WAYPOINT]
-    waypoints["ignores_altitude"] = np.isin(waypoints["item"], plain_items)
 
 
 def _set_circles(corners: Records, route: Route) -> None:
@@ -534,22 +530,6 @@ def _set_circles(corners: Records, route: Route) -> None:
     for i in range(len(corners) - 2, -1, -1):
         if corners[i].loiter_radius != 0.0 and corners[i + 1].loiter_radius != 0.0 and stops[i] == stops[i + 1]:
             corners[i].up = corners[i + 1].up
-
-
-def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
-    """Set the end condition of the loiter at each corner, from the loiter's mission item."""
-    waypoints["loiter_time"] = math.nan
-    for k in np.flatnonzero(waypoints["loiter_radius"]).tolist():
-        item = items.get(int(waypoints["item"][k]))
-        loiter = None if item is None else stated_loiter(item)
-        if loiter is None:
-            continue
-        waypoints["exits_on_tangent"][k] = loiter.exits_on_tangent
-        waypoints["loiter_turns"][k] = loiter.turns
-        if not loiter.turns:
-            waypoints["loiter_time"][k] = math.inf if loiter.endless else loiter.seconds
-            waypoints["loiters_to_altitude"][k] = loiter.to_altitude
-            waypoints["exits_on_course"][k] = loiter.exits_on_course
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:

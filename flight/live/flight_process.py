@@ -400,7 +400,15 @@ class _LoggedFlight:
                 end_reason = end_reason or (SHUT_DOWN if request.quit else STOPPED)
                 should_continue = not request.quit
             elif isinstance(request, DivertFlight) and not end_reason:
-                self._divert(request)
+                mode = request.mode
+                if self._start_route(request, DIVERTED_TEXT + MODE_NAMES[mode]):
+                    self._mode, self._loiter, self._loiter_logs = mode, None, 1
+                    if mode in (LOITER, GUIDED):
+                        item = self._flight.setup.mission.items[-1]
+                        center = LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame, item.params[2])
+                        self._loiter = replace(request, center=center)
+                    items = tuple(int(item) for item in self._flight.setup.route.items)
+                    send_event(self._connection, FlightDiverted(mode, "", items))
             if self._unwritten_rows and (end_reason or now - last_flush >= FLUSH_PERIOD_S):
                 self._write()
                 last_flush = now
@@ -427,18 +435,6 @@ class _LoggedFlight:
         """Write the rows since the last call to the current log, and hand them to the operating system."""
         self._logs[-1].write(as_track(join_rows(self._unwritten_rows)))
         self._unwritten_rows.clear()
-
-    def _divert(self, request: DivertFlight) -> None:
-        """Divert the flight if possible, and send an event about the new route."""
-        if not self._start_route(request, DIVERTED_TEXT + MODE_NAMES[request.mode]):
-            return
-        route = self._flight.setup.route
-        self._mode, self._loiter, self._loiter_logs = request.mode, None, 1
-        if request.mode in (LOITER, GUIDED):
-            item = self._flight.setup.mission.items[-1]
-            center = LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame, item.params[2])
-            self._loiter = replace(request, center=center)
-        send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
     def _start_route(self, request: DivertFlight, end_reason: str) -> bool:
         """Start another route at the aircraft's position, with its own log; return False if no such route exists.

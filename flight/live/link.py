@@ -469,7 +469,10 @@ class Link:
                 dropped.future += reason is RefusalReason.FUTURE
                 dropped.streams += reason is RefusalReason.STREAMS
                 if reason is RefusalReason.FUTURE:
-                    self._notice_clock_ahead(source[0])
+                    text = (
+                        "signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
+                    )
+                    self._notice_once(source[0], self._named_ahead, text)
                 continue
             message = self._decoder.decode(frame)
             if message is None:
@@ -484,7 +487,10 @@ class Link:
                 peer = self._register_peer(source, frame.system, frame.component)
             if peer is None:
                 self.dropped.stranger += 1
-                self._notice_stranger(message, source[0])
+                if self._is_for_vehicle(message):
+                    full_text = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
+                    text = f"sends {message.get_type()} and no HEARTBEAT{full_text}: it is not answered"
+                    self._notice_once(source[0], self._named_strangers, text)
             elif not self._is_for_vehicle(message):
                 self.dropped.others += 1
             else:
@@ -492,26 +498,11 @@ class Link:
                 messages.append((message, peer))
         return messages
 
-    def _notice_stranger(self, message: Any, host: str) -> None:
-        """Add a notice that messages from an address are not answered, once for each address."""
-        if (
-            host in self._named_strangers
-            or len(self._named_strangers) >= _MAX_NAMED_STRANGERS
-            or not self._is_for_vehicle(message)
-        ):
-            return
-        self._named_strangers.add(host)
-        full_text = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
-        self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full_text}: it is not answered")
-
-    def _notice_clock_ahead(self, host: str) -> None:
-        """Add a notice that a sender's clock is more than a day ahead of this one, once for each address."""
-        if host in self._named_ahead or len(self._named_ahead) >= _MAX_NAMED_STRANGERS:
-            return
-        self._named_ahead.add(host)
-        self._notices.append(
-            f"{host} signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
-        )
+    def _notice_once(self, host: str, named_hosts: set[str], text: str) -> None:
+        """Add a notice about an address, unless the address is in ``named_hosts``, which receives it."""
+        if host not in named_hosts and len(named_hosts) < _MAX_NAMED_STRANGERS:
+            named_hosts.add(host)
+            self._notices.append(f"{host} {text}")
 
     def pop_notices(self) -> list[str]:
         """Return and clear the notices about senders whose messages are ignored."""

@@ -402,18 +402,6 @@ class MissionServer:
         self._finished.pop(kind, None)
         return [self._request_next_item(upload, kind, now)]
 
-    def _answer_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
-        """Request a flight to the position or altitude of an item that a station sends outside an upload."""
-        try:
-            item = from_message(message, "go-to")
-        except MissionError as error:
-            return self._ack(station, mavlink.MAV_MISSION_INVALID, kind, str(error))
-        if message.current != _GO_TO_POSITION:
-            item = replace(item, lat_deg=math.nan, lon_deg=math.nan)
-        problem = self.go_to(item)
-        result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
-        return self._ack(station, result, kind, problem)
-
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Store an item of an upload; request the next item, or replace the list after the last item.
 
@@ -425,7 +413,16 @@ class MissionServer:
         """
         upload = self._uploads.get(kind)
         if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
-            return [self._answer_go_to(message, station, kind)]
+            # Fly to the position or altitude of an item that a station sends outside an upload.
+            try:
+                item = from_message(message, "go-to")
+            except MissionError as error:
+                return [self._ack(station, mavlink.MAV_MISSION_INVALID, kind, str(error))]
+            if message.current != _GO_TO_POSITION:
+                item = replace(item, lat_deg=math.nan, lon_deg=math.nan)
+            problem = self.go_to(item)
+            result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
+            return [self._ack(station, result, kind, problem)]
         if upload is None or upload.station != station:
             finished = self._finished.get(kind)
             is_last_item = finished is not None and (finished.station, finished.count) == (station, message.seq + 1)
@@ -441,7 +438,14 @@ class MissionServer:
         try:
             item = from_message(message, _TITLES[kind])
         except MissionError as error:
-            return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
+            # The result names an invalid latitude, an invalid longitude, or any other fault.
+            degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
+            result = mavlink.MAV_MISSION_INVALID
+            if abs(message.x) > 90.0 * degree_scale:
+                result = mavlink.MAV_MISSION_INVALID_PARAM5_X
+            elif abs(message.y) > 180.0 * degree_scale:
+                result = mavlink.MAV_MISSION_INVALID_PARAM6_Y
+            return [self._reject_upload(upload, kind, int(result), str(error))]
         is_allowed = (
             item.command in _ALLOWED_COMMANDS[kind]
             if kind in _ALLOWED_COMMANDS
@@ -557,16 +561,6 @@ def _item_request(
 ) -> MissionReply:
     """Return the request for an item of an upload."""
     return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
-
-
-def _refusal_result(message: Any) -> int:
-    """Return the MAV_MISSION_RESULT for an invalid item: its latitude, its longitude, or any other fault."""
-    degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
-    if abs(message.x) > 90.0 * degree_scale:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if abs(message.y) > 180.0 * degree_scale:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
-    return int(mavlink.MAV_MISSION_INVALID)
 
 
 _ITEM_MESSAGES = ("MISSION_ITEM_INT", "MISSION_ITEM")

@@ -125,30 +125,26 @@ class Parameters:
                     number,
                     f"{entry.name} {value:g}: refused, because parameters are fixed during a flight; {unchanged_text}",
                 )
-            return number, self._set_autopilot_parameter(entry, value)
+            if not math.isfinite(value):
+                return number, f"{entry.name} {value:g}: expected a finite number; {unchanged_text}"
+            # MAVLink carries 0.7 as 0.699999988. The number that was typed is the shortest one with the same float32.
+            stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
+            try:
+                values = self.autopilot_values(stated_values)
+            except PlanflyError as error:
+                return number, f"{error}; {unchanged_text}"
+            if values[entry.name] != stated_values[entry.name]:
+                return number, f"{entry.name} {_FIXED_REASON}: {unchanged_text}"
+            self.stated = stated_values
+            for autopilot_name, autopilot_value in values.items():
+                self.set_value(autopilot_name, autopilot_value)
+            return number, ""
         if entry.max_value is None:
             return number, f"{entry.name} {entry.fixed_reason}: {unchanged_text}"
         if not (math.isfinite(value) and entry.min_value <= value <= entry.max_value):
             return number, f"{entry.name} {value:g}: allowed {entry.min_value:g}..{entry.max_value:g}; {unchanged_text}"
         self.set_value(entry.name, value)
         return number, ""
-
-    def _set_autopilot_parameter(self, entry: Parameter, value: float) -> str:
-        """Set a parameter of the simulated autopilot, and return the reason for a refusal, or ""."""
-        if not math.isfinite(value):
-            return f"{entry.name} {value:g}: expected a finite number; the value stays {entry.value:g}"
-        # MAVLink carries 0.7 as 0.699999988. The number that was typed is the shortest one with the same float32.
-        stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
-        try:
-            values = self.autopilot_values(stated_values)
-        except PlanflyError as error:
-            return f"{error}; the value stays {entry.value:g}"
-        if values[entry.name] != stated_values[entry.name]:
-            return f"{entry.name} {_FIXED_REASON}: the value stays {entry.value:g}"
-        self.stated = stated_values
-        for name, autopilot_value in values.items():
-            self.set_value(name, autopilot_value)
-        return ""
 
 
 def vehicle_parameters(
@@ -339,31 +335,28 @@ class Requests:
                 else:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
             return self._acknowledge(peer, system, component, number, reply)
+        messages: list[Any] = []
         if number in _MESSAGE_COMMANDS:
             reply, messages = self._run_message_command(number, message, peer, now)
+        elif number == mavlink.MAV_CMD_DO_SET_MODE:
+            reply = self.arming.set_mode(_to_integer(message.param2))
+        elif number == mavlink.MAV_CMD_MISSION_START:
+            reply = self.arming.start_mission()
+        elif number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
+            reply = self.arming.pause_or_continue(message.param1 == 1)
+        elif number in _MODE_COMMANDS:
+            reply = self.arming.set_mode(_MODE_COMMANDS[number])
+        elif number == mavlink.MAV_CMD_DO_REPOSITION:
+            center = _parse_loiter_center(message)
+            reply = CommandResult(DENIED, _INVALID_POSITION_TEXT) if center is None else self.arming.go_to(center)
+        elif number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
+            reply = self.set_start_item(_to_integer(message.param1))
         else:
-            reply, messages = self._run_flight_command(number, message), []
+            reply = CommandResult(UNSUPPORTED, _UNSUPPORTED_COMMAND_TEXTS.get(number, ""))
         return [
             *self._acknowledge(peer, system, component, number, reply),
             *(PeerMessage(peer, extra_message) for extra_message in messages),
         ]
-
-    def _run_flight_command(self, number: int, message: Any) -> CommandResult:
-        """Run a command about modes or the mission; for any other command the result is UNSUPPORTED."""
-        if number == mavlink.MAV_CMD_DO_SET_MODE:
-            return self.arming.set_mode(_to_integer(message.param2))
-        if number == mavlink.MAV_CMD_MISSION_START:
-            return self.arming.start_mission()
-        if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
-            return self.arming.pause_or_continue(message.param1 == 1)
-        if number in _MODE_COMMANDS:
-            return self.arming.set_mode(_MODE_COMMANDS[number])
-        if number == mavlink.MAV_CMD_DO_REPOSITION:
-            center = _parse_loiter_center(message)
-            return CommandResult(DENIED, _INVALID_POSITION_TEXT) if center is None else self.arming.go_to(center)
-        if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
-            return self.set_start_item(_to_integer(message.param1))
-        return CommandResult(UNSUPPORTED, _UNSUPPORTED_COMMAND_TEXTS.get(number, ""))
 
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
@@ -374,34 +367,25 @@ class Requests:
         message_class = mavlink.mavlink_map.get(requested_number)
         name = message_class.msgname if message_class is not None else ""
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
-            message_class = mavlink.mavlink_map.get(_to_integer(message.param1))
-            return self._set_interval(message_class.msgname if message_class else "", message.param2, peer, now), []
+            # In microseconds; negative to switch the message off, 0 for the default interval.
+            interval = message.param2
+            if name not in PERIODS:
+                result = ACCEPTED if name == "HEARTBEAT" and interval in (0.0, 1e6) else UNSUPPORTED
+            elif not math.isfinite(interval):
+                result = DENIED
+            elif interval < 0:
+                result, peer.periods[name] = ACCEPTED, None
+            else:
+                period = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, interval / 1e6)) if interval else PERIODS[name]
+                result, peer.periods[name], peer.due[name] = ACCEPTED, period, now
+            return CommandResult(result), []
         if number == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
-            requested_number = _to_integer(message.param1)
-            message_class = mavlink.mavlink_map.get(requested_number)
-            period = peer.periods.get(message_class.msgname) if message_class is not None else None
-            interval = -1 if period is None else round(period * 1e6)
-            return CommandResult(ACCEPTED), [
-                mavlink.MAVLink_message_interval_message(requested_number & 0xFFFF, interval)
-            ]
+            current_period = peer.periods.get(name)
+            current_interval = -1 if current_period is None else round(current_period * 1e6)
+            reply = mavlink.MAVLink_message_interval_message(requested_number & 0xFFFF, current_interval)
+            return CommandResult(ACCEPTED), [reply]
         reply = telemetry_message(name, self.status)
         return (CommandResult(ACCEPTED), [reply]) if reply is not None else (CommandResult(UNSUPPORTED), [])
-
-    def _set_interval(self, name: str, interval: float, peer: Peer, now: float) -> CommandResult:
-        """Set the interval of a message to a peer.
-
-        interval: microseconds; negative to switch the message off, 0 for the default interval.
-        """
-        if name not in PERIODS:
-            return CommandResult(ACCEPTED if name == "HEARTBEAT" and interval in (0.0, 1e6) else UNSUPPORTED)
-        if not math.isfinite(interval):
-            return CommandResult(DENIED)
-        if interval < 0:
-            peer.periods[name] = None
-        else:
-            peer.periods[name] = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, interval / 1e6)) if interval else PERIODS[name]
-            peer.due[name] = now
-        return CommandResult(ACCEPTED)
 
     @staticmethod
     def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:

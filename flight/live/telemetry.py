@@ -346,7 +346,7 @@ def telemetry_message(name: str, status: Status) -> Any:
     (460000000, 500000, 100000)
     """
     maker = _MESSAGE_MAKERS.get(name)
-    return maker(status) if maker else None
+    return maker(status, status.snapshot) if maker else None
 
 
 def _boot_ms(status: Status) -> int:
@@ -354,47 +354,10 @@ def _boot_ms(status: Status) -> int:
     return int(status.boot * 1e3) & 0xFFFFFFFF
 
 
-def _attitude_message(status: Status) -> Any:
-    """Return ATTITUDE for a status."""
-    snapshot = status.snapshot
-    return mavlink.MAVLink_attitude_message(
-        _boot_ms(status), snapshot.roll, snapshot.pitch, snapshot.yaw, snapshot.p, snapshot.q, snapshot.r
-    )
-
-
-def _position_message(status: Status) -> Any:
-    """Return GLOBAL_POSITION_INT for a status."""
-    snapshot = status.snapshot
-    return mavlink.MAVLink_global_position_int_message(
-        _boot_ms(status),
-        round(snapshot.lat_deg * 1e7),
-        round(snapshot.lon_deg * 1e7),
-        round(snapshot.amsl * 1e3),
-        round((snapshot.amsl - status.home.alt) * 1e3),
-        _to_int16(snapshot.v_north * 100),
-        _to_int16(snapshot.v_east * 100),
-        _to_int16(snapshot.v_down * 100),
-        round(_to_degrees(snapshot.yaw) * 100) % 36000,
-    )
-
-
-def _hud_message(status: Status) -> Any:
-    """Return VFR_HUD for a status."""
-    snapshot = status.snapshot
-    return mavlink.MAVLink_vfr_hud_message(
-        snapshot.airspeed,
-        math.hypot(snapshot.v_north, snapshot.v_east),
-        int(_to_degrees(snapshot.yaw)),
-        max(0, min(100, round(snapshot.throttle * 100))),
-        snapshot.amsl,
-        -snapshot.v_down,
-    )
-
-
-def _sys_status_message(status: Status) -> Any:
-    """Return SYS_STATUS for a status."""
+def _sys_status_message(status: Status, snapshot: Snapshot) -> Any:
+    """Return SYS_STATUS for a status and its snapshot."""
     healthy_sensors = _SENSORS | (_PREARM if status.ready else 0)
-    remaining_fraction = max(0.0, 1.0 - status.snapshot.energy / status.battery)
+    remaining_fraction = max(0.0, 1.0 - snapshot.energy / status.battery)
     present_sensors = _SENSORS | _PREARM
     has_battery = status.volts > 0.0
     return mavlink.MAVLink_sys_status_message(
@@ -403,7 +366,7 @@ def _sys_status_message(status: Status) -> Any:
         healthy_sensors,
         min(1000, round(status.load * 1000)),
         min(round(status.volts * 1e3), _NOT_MEASURED_MV - 1) if has_battery else _NOT_MEASURED_MV,
-        _to_int16(status.snapshot.current * 100) if has_battery else _NOT_MEASURED_CA,
+        _to_int16(snapshot.current * 100) if has_battery else _NOT_MEASURED_CA,
         round(remaining_fraction * 100),
         0,
         0,
@@ -411,72 +374,6 @@ def _sys_status_message(status: Status) -> Any:
         0,
         0,
         0,
-    )
-
-
-def _gps_message(status: Status) -> Any:
-    """Return GPS_RAW_INT for a status."""
-    snapshot = status.snapshot
-    return mavlink.MAVLink_gps_raw_int_message(
-        int(status.boot * 1e6),
-        mavlink.GPS_FIX_TYPE_RTK_FIXED,
-        round(snapshot.lat_deg * 1e7),
-        round(snapshot.lon_deg * 1e7),
-        round(snapshot.amsl * 1e3),
-        50,
-        80,
-        min(65534, round(math.hypot(snapshot.v_north, snapshot.v_east) * 100)),
-        round(_to_degrees(math.atan2(snapshot.v_east, snapshot.v_north)) * 100) % 36000,
-        16,
-    )
-
-
-def _wind_message(status: Status) -> Any:
-    """Return WIND for a status."""
-    snapshot = status.snapshot
-    # Direction from which the wind blows.
-    from_direction = math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north))
-    return mavlink.MAVLink_wind_message(from_direction, math.hypot(snapshot.wind_east, snapshot.wind_north), 0.0)
-
-
-def _wind_cov_message(status: Status) -> Any:
-    """Return WIND_COV for a status."""
-    snapshot = status.snapshot
-    unknown = math.nan
-    return mavlink.MAVLink_wind_cov_message(
-        int(status.boot * 1e6),
-        snapshot.wind_north,
-        snapshot.wind_east,
-        0.0,
-        unknown,
-        unknown,
-        snapshot.amsl,
-        unknown,
-        unknown,
-    )
-
-
-def _extended_state_message(status: Status) -> Any:
-    """Return EXTENDED_SYS_STATE for a status."""
-    landed_state = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
-    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed_state)
-
-
-def _home_message(status: Status) -> Any:
-    """Return HOME_POSITION for a status."""
-    home = status.home
-    return mavlink.MAVLink_home_position_message(
-        round(home.lat_deg * 1e7),
-        round(home.lon_deg * 1e7),
-        round(home.alt * 1e3),
-        0.0,
-        0.0,
-        0.0,
-        [1.0, 0.0, 0.0, 0.0],
-        0.0,
-        0.0,
-        0.0,
-        int(status.boot * 1e6),
     )
 
 
@@ -490,22 +387,84 @@ def _to_degrees(angle: float) -> float:
     return math.degrees(angle) % 360.0
 
 
-_MESSAGE_MAKERS: dict[str, Callable[[Status], Any]] = {
-    "HEARTBEAT": heartbeat,
-    "ATTITUDE": _attitude_message,
-    "GLOBAL_POSITION_INT": _position_message,
-    "VFR_HUD": _hud_message,
-    "MISSION_CURRENT": lambda status: mavlink.MAVLink_mission_current_message(
+# Function that makes each message, from a status and its snapshot.
+_MESSAGE_MAKERS: dict[str, Callable[[Status, Snapshot], Any]] = {
+    "HEARTBEAT": lambda status, _: heartbeat(status),
+    "ATTITUDE": lambda status, snapshot: mavlink.MAVLink_attitude_message(
+        _boot_ms(status), snapshot.roll, snapshot.pitch, snapshot.yaw, snapshot.p, snapshot.q, snapshot.r
+    ),
+    "GLOBAL_POSITION_INT": lambda status, snapshot: mavlink.MAVLink_global_position_int_message(
+        _boot_ms(status),
+        round(snapshot.lat_deg * 1e7),
+        round(snapshot.lon_deg * 1e7),
+        round(snapshot.amsl * 1e3),
+        round((snapshot.amsl - status.home.alt) * 1e3),
+        _to_int16(snapshot.v_north * 100),
+        _to_int16(snapshot.v_east * 100),
+        _to_int16(snapshot.v_down * 100),
+        round(_to_degrees(snapshot.yaw) * 100) % 36000,
+    ),
+    "VFR_HUD": lambda _, snapshot: mavlink.MAVLink_vfr_hud_message(
+        snapshot.airspeed,
+        math.hypot(snapshot.v_north, snapshot.v_east),
+        int(_to_degrees(snapshot.yaw)),
+        max(0, min(100, round(snapshot.throttle * 100))),
+        snapshot.amsl,
+        -snapshot.v_down,
+    ),
+    "MISSION_CURRENT": lambda status, _: mavlink.MAVLink_mission_current_message(
         status.current, status.total, status.mission_state, 0
     ),
     "SYS_STATUS": _sys_status_message,
-    "GPS_RAW_INT": _gps_message,
-    "WIND": _wind_message,
-    "WIND_COV": _wind_cov_message,
-    "EXTENDED_SYS_STATE": _extended_state_message,
-    "HOME_POSITION": _home_message,
-    "AUTOPILOT_VERSION": lambda status: mavlink.MAVLink_autopilot_version_message(
+    "GPS_RAW_INT": lambda status, snapshot: mavlink.MAVLink_gps_raw_int_message(
+        int(status.boot * 1e6),
+        mavlink.GPS_FIX_TYPE_RTK_FIXED,
+        round(snapshot.lat_deg * 1e7),
+        round(snapshot.lon_deg * 1e7),
+        round(snapshot.amsl * 1e3),
+        50,
+        80,
+        min(65534, round(math.hypot(snapshot.v_north, snapshot.v_east) * 100)),
+        round(_to_degrees(math.atan2(snapshot.v_east, snapshot.v_north)) * 100) % 36000,
+        16,
+    ),
+    # The direction is that from which the wind blows.
+    "WIND": lambda _, snapshot: mavlink.MAVLink_wind_message(
+        math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north)),
+        math.hypot(snapshot.wind_east, snapshot.wind_north),
+        0.0,
+    ),
+    # The variabilities and the accuracies are not known.
+    "WIND_COV": lambda status, snapshot: mavlink.MAVLink_wind_cov_message(
+        int(status.boot * 1e6),
+        snapshot.wind_north,
+        snapshot.wind_east,
+        0.0,
+        math.nan,
+        math.nan,
+        snapshot.amsl,
+        math.nan,
+        math.nan,
+    ),
+    "EXTENDED_SYS_STATE": lambda status, _: mavlink.MAVLink_extended_sys_state_message(
+        mavlink.MAV_VTOL_STATE_UNDEFINED,
+        mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND,
+    ),
+    "HOME_POSITION": lambda status, _: mavlink.MAVLink_home_position_message(
+        round(status.home.lat_deg * 1e7),
+        round(status.home.lon_deg * 1e7),
+        round(status.home.alt * 1e3),
+        0.0,
+        0.0,
+        0.0,
+        [1.0, 0.0, 0.0, 0.0],
+        0.0,
+        0.0,
+        0.0,
+        int(status.boot * 1e6),
+    ),
+    "AUTOPILOT_VERSION": lambda *_: mavlink.MAVLink_autopilot_version_message(
         _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E
     ),
-    "SYSTEM_TIME": lambda status: mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _boot_ms(status)),
+    "SYSTEM_TIME": lambda status, _: mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _boot_ms(status)),
 }

@@ -113,8 +113,8 @@ def place_stops(
     terrain: None if unknown; heights above terrain are then an error.
     itinerary: the mission's itinerary; None to make it.
     vertical_legs: True to accept a position straight above or below the previous one. It is placed
-        `VERTICAL_LEG_LENGTH_M` away, and the leg then fails the verdict's slope rule. False to raise an error for such
-        a position.
+        `VERTICAL_LEG_LENGTH_M` away; the verdict's slope rule judges the vertical leg. False to raise an error for
+        such a position.
     resets_jump_counters: see `flight.mission.itinerary.make_itinerary`.
 
     In the result successive stops are at least `SAME_POSITION_DISTANCE_M` apart horizontally; on a vertical leg they

@@ -353,7 +353,10 @@ def waypoints_text(mission: Mission) -> str:
     The file has TABs, LF, and coordinates with at least eight decimals. A NaN is written as 0, which means "unset" in
     this format. Fences and rally points have files of their own.
     """
-    return _file_text(mission.home, renumber_items(mission).items)
+    home = mission.home or Home(0.0, 0.0, 0.0)
+    place = (home.lat_deg, home.lon_deg, home.alt)
+    home_item = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), *place)
+    return _file_text((home_item, *renumber_items(mission).items), current=home_item)
 
 
 def fence_text(mission: Mission) -> str:
@@ -361,35 +364,23 @@ def fence_text(mission: Mission) -> str:
 
     MAVProxy's `fence load` reads this form.
     """
-    return _file_without_home(number_items(mission.fences))
+    return _file_text(number_items(mission.fences))
 
 
 def rally_text(mission: Mission) -> str:
     """Return the rally points of a mission as a WPL file, numbered from 0 and without a home line."""
-    return _file_without_home(mission.rally)
+    return _file_text(mission.rally)
 
 
-def _file_without_home(items: tuple[MissionItem, ...]) -> str:
-    """Return the text of a WPL file without a home line."""
-    return "\n".join([HEADER, *(_item_line(item, current=False) for item in items)]) + "\n"
-
-
-def _file_text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
-    """Return the text of a WPL file that starts with a home line."""
-    position = home or Home(0.0, 0.0, 0.0)
-    home_item = MissionItem(
-        0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), position.lat_deg, position.lon_deg, position.alt
-    )
-    lines = [HEADER, *(_item_line(item, current=item is home_item) for item in (home_item, *items))]
+def _file_text(items: tuple[MissionItem, ...], current: MissionItem | None = None) -> str:
+    """Return the text of a WPL file of these items; ``current`` is the item at which the mission starts."""
+    lines = [HEADER]
+    for item in items:
+        integers = [str(int(value)) for value in (item.seq, item is current, item.frame, item.command)]
+        numbers = [_format_decimal(value, 0) for value in item.params]
+        position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
+        lines.append("\t".join([*integers, *numbers, *position, str(int(item.autocontinue))]))
     return "\n".join(lines) + "\n"
-
-
-def _item_line(item: MissionItem, *, current: bool) -> str:
-    """Return the line of an item; ``current`` marks the item at which the mission starts."""
-    numbers = [_format_decimal(value, 0) for value in item.params]
-    position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
-    integers = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
-    return "\t".join([*integers, *numbers, *position, str(int(item.autocontinue))])
 
 
 def _format_decimal(value: float, places: int) -> str:
@@ -446,7 +437,20 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]
     [(5001, 4.0, 36.5), (5001, 4.0, 36.5), (5001, 4.0, 36.51), (5001, 4.0, 36.51)]
     """
-    points = [_parse_point(TextLine(source, number), line) for number, line in _content_lines(text)]
+    points = []
+    for number, line in _content_lines(text):
+        location = TextLine(source, number)
+        try:
+            lat, lon = (float(part) for part in line.split())
+        except ValueError:
+            lat = lon = math.nan
+        if not (math.isfinite(lat) and math.isfinite(lon)):
+            allowed = "expected a latitude and a longitude"
+            raise MissionError(f"{location}: {line[:40]!r}: {allowed}", file=location.file, value=line, allowed=allowed)
+        problem = position_problem(lat, lon)
+        if problem is not None:
+            raise MissionError(**problem.error_arguments(location.file, location))
+        points.append((round_to_grid(lat), round_to_grid(lon)))
     if len(points) > MAX_POINTS:
         raise MissionError(
             f"{source}: too long: {count_text(len(points), 'point')}; the limit is {MAX_POINTS}", file=source
@@ -467,21 +471,6 @@ def _content_lines(text: str) -> list[tuple[int, str]]:
     """Return the number and the text of each line that is neither empty nor a comment."""
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), 1)
     return [(number, line.strip()) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
-
-
-def _parse_point(location: TextLine, line: str) -> tuple[float, float]:
-    """Parse a latitude and a longitude, degrees. Raises MissionError for an invalid line."""
-    try:
-        lat, lon = (float(part) for part in line.split())
-    except ValueError:
-        lat = lon = math.nan
-    if not (math.isfinite(lat) and math.isfinite(lon)):
-        allowed = "expected a latitude and a longitude"
-        raise MissionError(f"{location}: {line[:40]!r}: {allowed}", file=location.file, value=line, allowed=allowed)
-    problem = position_problem(lat, lon)
-    if problem is not None:
-        raise MissionError(**problem.error_arguments(location.file, location))
-    return round_to_grid(lat), round_to_grid(lon)
 
 
 # ----------------------------------------------------------------------

@@ -71,11 +71,19 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
         location = f"mission.items.{index}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECT_KINDS:
-            replacements = _transect_items(item, source, location, name)
-            settings = item["TransectStyleComplexItem"]
+            settings = item.get("TransectStyleComplexItem")
+            replacements = settings.get("Items") if isinstance(settings, dict) else None
+            if not isinstance(replacements, list) or not replacements:
+                field, shown = f"{location}.TransectStyleComplexItem.Items", f"{name!r} without its items"
+                allowed = "expected a list; save the plan again in the ground station"
+                raise MissionError.at(source, field, replacements, allowed, shown=shown)
             plans.append(_survey_plan(settings, replacements, f"{source}: {location}", warnings))
         elif name == _LANDING_KIND:
-            replacements = _landing_items(item, source, location, _last_number(simple_items) + 1)
+            # The landing's items continue the numbers of the items before, or their count if the last has no number.
+            last_item = simple_items[-1] if simple_items else None
+            last_number = last_item.get("doJumpId") if isinstance(last_item, dict) else None
+            first_number = (last_number if isinstance(last_number, int) else len(simple_items)) + 1
+            replacements = _landing_items(item, source, location, first_number)
         else:
             read_kinds = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
             allowed = f"{read_kinds}; convert it to items in the ground station first"
@@ -114,23 +122,6 @@ def _to_current_form(item: Any, location: str, warnings: list[str]) -> Any:
         )
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
-
-
-def _transect_items(item: dict[str, Any], source: str, location: str, name: str) -> list[Any]:
-    """Return the simple items that a survey or corridor scan contains.
-
-    location: location of the item in the file, for messages.
-    name: kind of the ComplexItem.
-
-    Raises MissionError if the item contains none.
-    """
-    settings = item.get("TransectStyleComplexItem")
-    items = settings.get("Items") if isinstance(settings, dict) else None
-    if not isinstance(items, list) or not items:
-        field, shown = f"{location}.TransectStyleComplexItem.Items", f"{name!r} without its items"
-        allowed = "expected a list; save the plan again in the ground station"
-        raise MissionError.at(source, field, items, allowed, shown=shown)
-    return items
 
 
 class _CameraCalc(BaseModel):
@@ -188,25 +179,15 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
     stated_photo = calc.get("AdjustedFootprintFrontal") if isinstance(calc, dict) else 0.0
     if isinstance(stated_photo, bool) or not isinstance(stated_photo, int | float) or not 0.0 < stated_photo <= 1e6:
         stated_photo = 0.0
-    return SurveyPlan(_trigger_distance(items), float(turn_around), camera, float(stated_photo))
-
-
-def _trigger_distance(items: list[Any]) -> float:
-    """Return the longest distance between photos that the items state (m), or 0 if no item states one."""
-    distances = [0.0]
+    # The longest distance between photos that the items state, m; 0 if no item states one.
+    trigger_distance = 0.0
     for item in items:
         params = item.get("params") if isinstance(item, dict) else None
         if isinstance(params, list) and params and item.get("command") == Command.DO_SET_CAM_TRIGG_DIST:
             metres = params[0]
             if isinstance(metres, int | float) and not isinstance(metres, bool) and 0.0 < metres <= 1e6:
-                distances.append(float(metres))
-    return max(distances)
-
-
-def _last_number(items: list[Any]) -> int:
-    """Return the number of the last item, or the number of items if the last item states no number."""
-    number = items[-1].get("doJumpId") if items and isinstance(items[-1], dict) else None
-    return number if isinstance(number, int) else len(items)
+                trigger_distance = max(trigger_distance, float(metres))
+    return SurveyPlan(trigger_distance, float(turn_around), camera, float(stated_photo))
 
 
 def _landing_items(item: dict[str, Any], source: str, location: str, number: int) -> list[Any]:
@@ -220,8 +201,11 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
     """
 
     def read_position(key: str) -> list[Any] | None:
-        """Return the latitude, longitude and altitude under a key of the pattern, or None if it is missing."""
-        return _read_coordinate(item, key, source, location)
+        """Return the latitude, longitude and altitude under a key of the pattern, or None if missing or null."""
+        value = item.get(key)
+        if value is not None and (not isinstance(value, list) or len(value) != 3 or None in value):
+            raise MissionError.at(source, f"{location}.{key}", value, _COORDINATE_TEXT, shown=json.dumps(value)[:40])
+        return value
 
     approach = read_position("landingApproachCoordinate") or read_position("loiterCoordinate")
     land = read_position("landCoordinate")
@@ -244,9 +228,23 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
         if is_spiral
         else (Command.NAV_WAYPOINT, [0.0, 0.0, 0.0, None])
     )
-    simple_items: list[tuple[int, int, list[Any]]] = [
-        (Command.DO_LAND_START, Frame.MISSION, [0.0] * 7),
-        *_landing_commands(item, source, location),
+    # MAV_CMD, MAV_FRAME and seven parameters of each item.
+    simple_items: list[tuple[int, int, list[Any]]] = [(Command.DO_LAND_START, Frame.MISSION, [0.0] * 7)]
+    if item.get("useDoChangeSpeed") is True:
+        speed = item.get("finalApproachSpeed")
+        if isinstance(speed, bool) or not isinstance(speed, int | float) or not 0.0 < speed <= _MAX_SPEED_MPS:
+            allowed = f"expected more than 0, up to {_MAX_SPEED_MPS:g} m/s"
+            field = f"{location}.finalApproachSpeed"
+            raise MissionError.at(source, field, speed, allowed, shown=json.dumps(speed)[:40])
+        # An airspeed in whole m/s, and the throttle unchanged.
+        speed_params = [0.0, float(int(speed)), -1.0, 0.0, 0.0, 0.0, 0.0]
+        simple_items.append((Command.DO_CHANGE_SPEED, Frame.MISSION, speed_params))
+    if item.get("stopTakingPhotos") is True:
+        simple_items.append((Command.DO_SET_CAM_TRIGG_DIST, Frame.MISSION, [0.0] * 7))
+        simple_items.append((Command.IMAGE_STOP_CAPTURE, Frame.MISSION, [0.0, *[None] * 6]))
+    if item.get("stopVideoPhotos") is True:
+        simple_items.append((Command.VIDEO_STOP_CAPTURE, Frame.MISSION, [0.0, *[None] * 6]))
+    simple_items += [
         (approach_command[0], frame, [*approach_command[1], *approach]),
         (Command.NAV_LAND, frame, [0.0, 0.0, 0.0, 0.0, *land]),
     ]
@@ -261,44 +259,6 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
         }
         for index, (command, item_frame, params) in enumerate(simple_items)
     ]
-
-
-def _landing_commands(item: dict[str, Any], source: str, location: str) -> list[tuple[int, int, list[Any]]]:
-    """Return the optional commands of a landing pattern, each as MAV_CMD, MAV_FRAME and seven parameters.
-
-    item: JSON object of the pattern.
-    location: location of the item in the file, for messages.
-
-    Raises MissionError for an approach speed that is not a number above 0, or that is too high.
-    """
-    commands: list[tuple[int, int, list[Any]]] = []
-    if item.get("useDoChangeSpeed") is True:
-        speed = item.get("finalApproachSpeed")
-        if isinstance(speed, bool) or not isinstance(speed, int | float) or not 0.0 < speed <= _MAX_SPEED_MPS:
-            allowed = f"expected more than 0, up to {_MAX_SPEED_MPS:g} m/s"
-            field = f"{location}.finalApproachSpeed"
-            raise MissionError.at(source, field, speed, allowed, shown=json.dumps(speed)[:40])
-        # An airspeed in whole m/s, and the throttle unchanged.
-        commands.append((Command.DO_CHANGE_SPEED, Frame.MISSION, [0.0, float(int(speed)), -1.0, 0.0, 0.0, 0.0, 0.0]))
-    if item.get("stopTakingPhotos") is True:
-        commands.append((Command.DO_SET_CAM_TRIGG_DIST, Frame.MISSION, [0.0] * 7))
-        commands.append((Command.IMAGE_STOP_CAPTURE, Frame.MISSION, [0.0, *[None] * 6]))
-    if item.get("stopVideoPhotos") is True:
-        commands.append((Command.VIDEO_STOP_CAPTURE, Frame.MISSION, [0.0, *[None] * 6]))
-    return commands
-
-
-def _read_coordinate(item: dict[str, Any], key: str, source: str, location: str) -> list[Any] | None:
-    """Return the latitude, longitude and altitude under a key of an item, or None if the key is missing or null.
-
-    Raises MissionError for anything but three values.
-    """
-    value = item.get(key)
-    if value is None:
-        return None
-    if not isinstance(value, list) or len(value) != 3 or None in value:
-        raise MissionError.at(source, f"{location}.{key}", value, _COORDINATE_TEXT, shown=json.dumps(value)[:40])
-    return value
 
 
 # QGC's default hover speed, m/s; a fixed wing has none.
@@ -388,21 +348,6 @@ _FIRMWARES = {3: "ardupilot", 12: "px4"}
 _UNNAMED_FIRMWARES = (0, 8)
 
 
-def _check_vehicle(kind: int | None, source: str) -> None:
-    """Raise MissionError if a plan is for a vehicle other than a fixed-wing aircraft.
-
-    kind: MAV_TYPE of the vehicle; None if missing.
-    source: name of the file in messages.
-    """
-    for kinds, name in _OTHER_VEHICLES:
-        if kind in kinds:
-            allowed = f"{name}; planfly flies only fixed-wing aircraft (vehicleType 1)"
-            raise MissionError.at(source, "mission.vehicleType", kind, allowed)
-    if kind is not None and kind not in _FIXED_WING_TYPES:
-        allowed = "not a fixed-wing aircraft; expected 1 (MAV_TYPE_FIXED_WING)"
-        raise MissionError.at(source, "mission.vehicleType", kind, allowed)
-
-
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
@@ -418,7 +363,15 @@ def parse_plan_file(text: str, source: str) -> Mission:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise MissionError(**first_fault(error, data, container=JSON_OBJECT).at(source)) from error
-    _check_vehicle(file.mission.vehicleType, source)
+    # Only a plan for a fixed wing, or for no stated vehicle, is flown.
+    vehicle_type = file.mission.vehicleType
+    for types, name in _OTHER_VEHICLES:
+        if vehicle_type in types:
+            allowed = f"{name}; planfly flies only fixed-wing aircraft (vehicleType 1)"
+            raise MissionError.at(source, "mission.vehicleType", vehicle_type, allowed)
+    if vehicle_type is not None and vehicle_type not in _FIXED_WING_TYPES:
+        allowed = "not a fixed-wing aircraft; expected 1 (MAV_TYPE_FIXED_WING)"
+        raise MissionError.at(source, "mission.vehicleType", vehicle_type, allowed)
     # None or 0: the plan names no autopilot.
     firmware = file.mission.firmwareType or 0
     if firmware not in _UNNAMED_FIRMWARES and firmware not in _FIRMWARES:
@@ -448,11 +401,17 @@ def parse_plan_file(text: str, source: str) -> Mission:
         warnings.append(
             f"{source}: the values of doJumpId are not 1 to {len(items)}: items are numbered by their order instead"
         )
+    fences = _read_fences(file.geoFence, source)
+    rally = []
+    for number, (lat, lon, alt) in enumerate(file.rallyPoints.points):
+        place = (round_to_grid(lat), round_to_grid(lon), alt)
+        point = MissionItem(number, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, *place)
+        rally.append(_checked_item(point, source, f"rallyPoints.points.{number}"))
     mission = Mission(
         home=home,
         items=tuple(items),
-        fences=_read_fences(file.geoFence, source),
-        rally=_read_rally(file.rallyPoints, source),
+        fences=fences,
+        rally=tuple(rally),
         cruise_speed=file.mission.cruiseSpeed,
         warnings=tuple(warnings),
         source=source,
@@ -494,10 +453,18 @@ def _read_item(item: _Item, index: int, source: str) -> MissionItem:
         lat, lon = round_to_grid(lat), round_to_grid(lon)
     seq = index + 1 if item.doJumpId is None else item.doJumpId
     mission_item = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
-    problem = item_problem(mission_item)
+    return _checked_item(mission_item, source, f"mission.items.{index} (item {seq})")
+
+
+def _checked_item(item: MissionItem, source: str, location: str) -> MissionItem:
+    """Return a mission item unchanged. Raises MissionError if it is invalid.
+
+    location: location of the item in the file, for the message.
+    """
+    problem = item_problem(item)
     if problem is not None:
-        raise MissionError(**problem.error_arguments(source, f"{source}: mission.items.{index} (item {seq})"))
-    return mission_item
+        raise MissionError(**problem.error_arguments(source, f"{source}: {location}"))
+    return item
 
 
 def _read_home(values: list[float | None] | None, source: str) -> Home | None:
@@ -510,9 +477,7 @@ def _read_home(values: list[float | None] | None, source: str) -> Home | None:
     lat, lon, alt = values[0], values[1], math.nan if values[2] is None else values[2] + 0.0
     known_alt = 0.0 if math.isnan(alt) else alt
     home_item = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, known_alt)
-    problem = item_problem(home_item)
-    if problem is not None:
-        raise MissionError(**problem.error_arguments(source, f"{source}: mission.plannedHomePosition"))
+    _checked_item(home_item, source, "mission.plannedHomePosition")
     return Home(round_to_grid(lat), round_to_grid(lon), alt) if home_item.has_position else None
 
 
@@ -527,19 +492,9 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
         point: latitude and longitude, degrees.
         location: location of the shape in the file, for messages.
         """
-        item = MissionItem(
-            len(fences),
-            int(command),
-            Frame.GLOBAL,
-            (p1, 0.0, 0.0, 0.0),
-            round_to_grid(point[0]),
-            round_to_grid(point[1]),
-            0.0,
-        )
-        problem = item_problem(item)
-        if problem is not None:
-            raise MissionError(**problem.error_arguments(source, f"{source}: geoFence.{location}"))
-        fences.append(item)
+        lat, lon = round_to_grid(point[0]), round_to_grid(point[1])
+        item = MissionItem(len(fences), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), lat, lon, 0.0)
+        fences.append(_checked_item(item, source, f"geoFence.{location}"))
 
     for index, shape in enumerate(fence.polygons):
         command = (
@@ -555,26 +510,6 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
     return tuple(fences)
 
 
-def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
-    """Return the rally points of a plan. Raises MissionError for an invalid position."""
-    points = []
-    for number, (lat, lon, alt) in enumerate(rally.points):
-        item = MissionItem(
-            number,
-            int(Command.NAV_RALLY_POINT),
-            Frame.GLOBAL_RELATIVE_ALT,
-            (0.0,) * 4,
-            round_to_grid(lat),
-            round_to_grid(lon),
-            alt,
-        )
-        problem = item_problem(item)
-        if problem is not None:
-            raise MissionError(**problem.error_arguments(source, f"{source}: rallyPoints.points.{number}"))
-        points.append(item)
-    return tuple(points)
-
-
 def plan_file_text(mission: Mission) -> str:
     """Return a mission as the text of a `.plan` file; equal missions give equal bytes.
 
@@ -585,9 +520,38 @@ def plan_file_text(mission: Mission) -> str:
     mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
     modes = {_altitude_mode(item.frame) for item in mission.items if is_located(item.command, item.frame)}
+    # The items, as SimpleItems.
+    simple_items: list[dict[str, Any]] = []
+    for item in mission.items:
+        values = (*item.params, item.lat_deg, item.lon_deg, item.alt)
+        numbers = [None if math.isnan(value) else value for value in values]
+        simple_item: dict[str, Any] = {
+            "autoContinue": item.autocontinue,
+            "command": int(item.command),
+            "doJumpId": item.seq,
+            "frame": int(item.frame),
+            "params": numbers,
+            "type": "SimpleItem",
+        }
+        if is_located(item.command, item.frame):
+            # QGC leaves these out for commands without a position.
+            altitude_mode = _altitude_mode(item.frame)
+            simple_item |= {"AMSLAltAboveTerrain": None, "Altitude": numbers[6], "AltitudeMode": altitude_mode}
+        simple_items.append(simple_item)
+    # The fences, as the geoFence.
+    circles: list[dict[str, Any]] = []
+    polygons: list[dict[str, Any]] = []
+    for shape in fence_shapes(mission.fences):
+        inclusion = shape[0].command in INCLUSIONS
+        if shape[0].command in POLYGONS:
+            polygon = [[corner.lat_deg, corner.lon_deg] for corner in shape]
+            polygons.append({"inclusion": inclusion, "polygon": polygon, "version": 1})
+        else:
+            disc = {"center": [shape[0].lat_deg, shape[0].lon_deg], "radius": shape[0].params[0]}
+            circles.append({"circle": disc, "inclusion": inclusion, "version": 1})
     data = {
         "fileType": "Plan",
-        "geoFence": _fence_json(mission.fences),
+        "geoFence": {"circles": circles, "polygons": polygons, "version": 2},
         "groundStation": "planfly",
         "mission": {
             "cruiseSpeed": round(stated_cruise_speed(mission) or _CRUISE_SPEED_MPS),
@@ -595,7 +559,7 @@ def plan_file_text(mission: Mission) -> str:
             # 0: mixed.
             "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else 0,
             "hoverSpeed": _HOVER_SPEED_MPS,
-            "items": [_item_json(item) for item in mission.items],
+            "items": simple_items,
             "plannedHomePosition": [home.lat_deg, home.lon_deg, home.alt],
             "vehicleType": 1,
             "version": 2,
@@ -629,40 +593,6 @@ def stated_cruise_speed(mission: Mission) -> float | None:
         if item.command == Command.DO_CHANGE_SPEED and 0.0 < item.params[1] <= _MAX_SPEED_MPS:
             return item.params[1]
     return None
-
-
-def _item_json(item: MissionItem) -> dict[str, Any]:
-    """Return an item as a SimpleItem of a `.plan`."""
-    values = (*item.params, item.lat_deg, item.lon_deg, item.alt)
-    numbers = [None if math.isnan(value) else value for value in values]
-    data: dict[str, Any] = {
-        "autoContinue": item.autocontinue,
-        "command": int(item.command),
-        "doJumpId": item.seq,
-        "frame": int(item.frame),
-        "params": numbers,
-        "type": "SimpleItem",
-    }
-    if is_located(item.command, item.frame):
-        # QGC leaves these out for commands without a position.
-        data |= {"AMSLAltAboveTerrain": None, "Altitude": numbers[6], "AltitudeMode": _altitude_mode(item.frame)}
-    return data
-
-
-def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
-    """Return fence items as the geoFence of a `.plan`."""
-    circles: list[dict[str, Any]] = []
-    polygons: list[dict[str, Any]] = []
-    for shape in fence_shapes(fences):
-        item = shape[0]
-        inclusion = item.command in INCLUSIONS
-        if item.command in POLYGONS:
-            polygon = [[corner.lat_deg, corner.lon_deg] for corner in shape]
-            polygons.append({"inclusion": inclusion, "polygon": polygon, "version": 1})
-        else:
-            disc = {"center": [item.lat_deg, item.lon_deg], "radius": item.params[0]}
-            circles.append({"circle": disc, "inclusion": inclusion, "version": 1})
-    return {"circles": circles, "polygons": polygons, "version": 2}
 
 
 def _refuse_constant(name: str) -> float:

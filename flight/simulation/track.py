@@ -70,7 +70,7 @@ class Track:
     """Flown track, as stored in a log.
 
     Time and position are float64, and all other values float32, so that a log stores them exactly. All arrays have t
-    rows. World axes east, north, up; SI and radians.
+    rows. World axes east, north, up; SI and radians, except the energy in Wh.
 
     Position, velocity, attitude and clearance are the true ones. `cross_track` and `height_error` are the errors as the
     guidance estimates them, from its navigation ("gnss", "rtk") and relative to the path that it follows. For the true

@@ -11,7 +11,7 @@ import numpy as np
 from flight.simulation.setup import Gap, RowFaults
 from flight.simulation.track import MAX_TIME_S
 from logs.importers.raw_log import LogSeries
-from world.arrays import Flags, Floats, Ints
+from world.arrays import Flags, Floats
 
 # ----------------------------------------------------------------------
 # The clock: permanent jumps back are removed, and late rows are sorted.
@@ -37,9 +37,10 @@ class SteadyClock:
 def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
     """Remove the backward jumps of a log's clock from the times of its rows.
 
-    A clock that goes back and stays back has been reset.  The first row after the reset is then moved to ``usual_step``
-    s after the latest row before it, and all later rows are shifted by the same time.  A single row out of order keeps
-    its time.
+    A row is late if its time is more than `MAX_CLOCK_LAG_S` before the latest time so far.  A clock that goes back and
+    stays back, so that `MIN_LATE_ROWS` rows in sequence, or all rows to the end, are late, has been reset.  The first
+    row after the reset is then moved to ``usual_step`` s after the latest row before it, and all later rows are shifted
+    by the same time.  A single row out of order, also at the end, keeps its time.
 
     time: times of the rows in the order of the file, s, (n,).
     usual_step: time that is assumed to have passed between the last row before a jump and the first row after it, s.
@@ -54,32 +55,16 @@ def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
     begin = 0
     while begin < shifted.size:
         latest = np.maximum.accumulate(shifted[begin:])
-        late_rows = np.flatnonzero(shifted[begin:] < latest - MAX_CLOCK_LAG_S)
-        jump = _find_clock_jump(late_rows, shifted[begin:], latest)
-        if jump < 0:
+        for jump in np.flatnonzero(shifted[begin:] < latest - MAX_CLOCK_LAG_S).tolist():
+            following = shifted[begin + jump : begin + jump + MIN_LATE_ROWS]
+            if following.size > 1 and (following < latest[jump - 1] - MAX_CLOCK_LAG_S).all():
+                break
+        else:
             break
-        start_row = begin + jump
+        begin += jump
         jumps.append(float(latest[jump - 1]))
-        shifted[start_row:] += latest[jump - 1] + usual_step - shifted[start_row]
-        begin = start_row
+        shifted[begin:] += latest[jump - 1] + usual_step - shifted[begin]
     return SteadyClock(shifted, tuple(jumps))
-
-
-def _find_clock_jump(late_rows: Ints, time: Floats, latest: Floats) -> int:
-    """Return the first row after the clock went back and stayed back, or -1 if it never did.
-
-    A row is late if its time is more than `MAX_CLOCK_LAG_S` before the latest time so far.  The clock stays back if
-    `MIN_LATE_ROWS` rows in sequence, or all rows to the end, are late.  A single late row at the end is not a jump.
-
-    late_rows: numbers of all late rows.
-    time: time of each row, s, (n,).
-    latest: latest time up to and including each row, s, (n,).
-    """
-    for k in late_rows.tolist():
-        end_row = min(k + MIN_LATE_ROWS, time.size)
-        if end_row - k >= min(MIN_LATE_ROWS, 2) and (time[k:end_row] < latest[k - 1] - MAX_CLOCK_LAG_S).all():
-            return int(k)
-    return -1
 
 
 # ----------------------------------------------------------------------

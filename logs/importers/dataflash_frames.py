@@ -202,11 +202,23 @@ class Dataflash:
     release_memory: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
-        """Return all messages with a name; the result has length 0 if the log has none."""
-        for number, message_format in self.formats.items():
-            if message_format.name == name and number in self.starts:
-                return _read_messages(self.data, self.starts[number], message_format, self.release_memory)
-        return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
+        """Return all messages with a name, except a cut message at the end; length 0 if the log has none."""
+        numbers = [number for number, entry in self.formats.items() if entry.name == name and number in self.starts]
+        if not numbers:
+            return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
+        message_format, starts = self.formats[numbers[0]], self.starts[numbers[0]]
+        starts = starts[starts + message_format.length <= len(self.data)]
+        dtype = message_format.dtype
+        rows = np.zeros(0, dtype)
+        if len(starts) and dtype.itemsize:
+            windows = np.lib.stride_tricks.sliding_window_view(self.data, dtype.itemsize)
+            rows = np.empty(len(starts), dtype)
+            first = 0
+            for end in iterate_piece_ends(self.data.size, self.release_memory):
+                last = int(np.searchsorted(starts, end))
+                rows[first:last] = windows[starts[first:last] + HEADER_BYTES].view(dtype)[:, 0]
+                first = last
+        return Messages(starts, rows, message_format.scales)
 
 
 def index_dataflash(
@@ -307,24 +319,6 @@ def _parse_format(body: bytes) -> MessageFormat | None:
         return None
     message_format = MessageFormat(number, name, length, names, letters)
     return message_format if message_format.dtype.itemsize + HEADER_BYTES == length else None
-
-
-def _read_messages(
-    data: Bytes, starts: Ints, message_format: MessageFormat, release_memory: Callable[[], None]
-) -> Messages:
-    """Read the messages of one format that begin at the given bytes; a cut message at the end is left out."""
-    starts = starts[starts + message_format.length <= len(data)]
-    dtype = message_format.dtype
-    rows = np.zeros(0, dtype)
-    if len(starts) and dtype.itemsize:
-        windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
-        rows = np.empty(len(starts), dtype)
-        first = 0
-        for end in iterate_piece_ends(data.size, release_memory):
-            last = int(np.searchsorted(starts, end))
-            rows[first:last] = windows[starts[first:last] + HEADER_BYTES].view(dtype)[:, 0]
-            first = last
-    return Messages(starts, rows, message_format.scales)
 
 
 # Indices of the state of a walk over messages.

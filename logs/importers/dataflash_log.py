@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Home, MissionItem, round_to_grid
@@ -156,14 +155,46 @@ class _Reader:
     """Reader of one log, with a method for each part of `RawLog`."""
 
     def __init__(self, index: Dataflash, source: str) -> None:
-        """Take the index of a log and its path, and find the jumps of the log's clock."""
+        """Take the index of a log and its path, and find the backward jumps of the log's clock.
+
+        The jumps are found from the n messages POS, ATT, GPS and MODE; other messages are corrected like their
+        neighbours in the file.
+        """
         self._index, self._source = index, source
         self._cache: dict[str, Messages] = {}
-        self._clock = self._find_clock_shifts()
+        times, starts = [np.zeros(0)], [np.zeros(0, np.int64)]
+        for name in ("POS", "ATT", "GPS", "MODE"):
+            messages = self._select_messages(name)
+            if messages.has("TimeUS") or messages.has("TimeMS"):
+                times.append(_read_raw_time(messages))
+                starts.append(messages.starts)
+        order = np.argsort(np.concatenate(starts), kind="stable")
+        raw_times = np.concatenate(times)[order]
+        is_finite = np.isfinite(raw_times)
+        steady = remove_clock_jumps(raw_times[is_finite])
+        # Byte at which each of these messages starts, (n,), shift that must be added to its time, s, (n,), and times of
+        # the jumps, s.
+        self._clock_starts = np.concatenate(starts)[order][is_finite]
+        self._clock_shifts = steady.time - raw_times[is_finite]
+        self._clock_jumps = steady.jumps
 
     def read(self) -> RawLog:
         """Return the log.  Raises LogError for a log without positions."""
-        series = {name: values for name, values in self._read_series() if values is not None and len(values.time)}
+        wind = self._read_first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
+        throttles = (self._read_table("CTUN", (column,), 0.01) for column in ("ThO", "ThrOut"))
+        tables = {
+            "position": self._read_position(),
+            "velocity": self._read_velocity(),
+            "attitude": self._read_first_table(
+                (("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE
+            ),
+            # Without an estimate the wind stays zero.
+            "wind": wind if wind is not None and np.any(wind.values) else None,
+            "airspeed": self._read_airspeed(),
+            "battery": self._read_battery(),
+            "throttle": next((table for table in throttles if table is not None and len(table.time)), None),
+        }
+        series = {name: table for name, table in tables.items() if table is not None and len(table.time)}
         program, vehicle = find_firmware_and_vehicle(
             [text for _, text in self._read_events()], self._select_messages("VER")
         )
@@ -181,6 +212,14 @@ class _Reader:
         if messages.has("Name", "Value"):
             values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
             parameters = {name: value for name, value in values if name and math.isfinite(value)}
+        modes: list[ModeChange] = []
+        mode_messages = self._select_messages("MODE")
+        column = "ModeNum" if mode_messages.has("ModeNum") else "Mode"
+        # Some logs state modes by name instead of number.
+        if mode_messages.has(column) and mode_messages.rows.dtype[column].kind != "S":
+            numbers = mode_messages.rows[column].tolist()
+            for time, number in zip(self._compute_times(mode_messages).tolist(), numbers, strict=True):
+                modes.append(ModeChange(time, *describe_plane_mode(int(number))))
         return RawLog(
             source=self._source,
             format=FORMAT,
@@ -189,14 +228,14 @@ class _Reader:
             series=series,
             heights=tuple(self._read_heights()),
             datum="amsl",
-            modes=tuple(self._read_modes()),
+            modes=tuple(modes),
             missions=tuple(
                 make_dataflash_missions(commands, command_times, self._select_messages("ORGN"), self._source)
             ),
             parameters=parameters,
             events=tuple(self._read_events()),
             utc_start=self._find_utc_start(),
-            clock_jumps=self._clock[2],
+            clock_jumps=self._clock_jumps,
             damage=self._index.damage,
         )
 
@@ -212,34 +251,13 @@ class _Reader:
             self._cache[name] = messages
         return self._cache[name]
 
-    def _find_clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
-        """Find the backward jumps of the log's clock from the n messages POS, ATT, GPS and MODE.
-
-        Returns the byte at which each of these messages starts, (n,), the shift that must be added to its time, s,
-        (n,), and the times of the jumps, s.  Other messages are corrected like their neighbours in the file.
-        """
-        times, starts = [], []
-        for name in ("POS", "ATT", "GPS", "MODE"):
-            messages = self._select_messages(name)
-            if messages.has("TimeUS") or messages.has("TimeMS"):
-                times.append(_read_raw_time(messages))
-                starts.append(messages.starts)
-        if not times:
-            return np.zeros(0, np.int64), np.zeros(0), ()
-        order = np.argsort(np.concatenate(starts), kind="stable")
-        sorted_starts = np.concatenate(starts)[order]
-        raw_times = np.concatenate(times)[order]
-        is_finite = np.isfinite(raw_times)
-        steady = remove_clock_jumps(raw_times[is_finite])
-        return sorted_starts[is_finite], steady.time - raw_times[is_finite], steady.jumps
-
     def _compute_times(self, messages: Messages) -> Floats:
         """Return the times of messages on the clock without jumps back, s."""
-        starts, shifts, jumps = self._clock
         raw_time = _read_raw_time(messages)
-        if not jumps:
+        if not self._clock_jumps:
             return raw_time
-        return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
+        following = np.searchsorted(self._clock_starts, messages.starts)
+        return np.asarray(raw_time + self._clock_shifts[np.clip(following, 0, len(self._clock_shifts) - 1)])
 
     def _read_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
         """Return fields of the messages with a name, multiplied by `scale`.
@@ -252,22 +270,6 @@ class _Reader:
             return None
         values = np.stack([messages.column(column) for column in columns], axis=1)
         return LogSeries(name, self._compute_times(messages), values * scale)
-
-    def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
-        yield "position", self._read_position()
-        yield "velocity", self._read_velocity()
-        yield (
-            "attitude",
-            self._read_first_table((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE),
-        )
-        wind = self._read_first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
-        # Without an estimate the wind stays zero.
-        yield "wind", wind if wind is not None and np.any(wind.values) else None
-        yield "airspeed", self._read_airspeed()
-        yield "battery", self._read_battery()
-        throttles = (self._read_table("CTUN", (column,), 0.01) for column in ("ThO", "ThrOut"))
-        yield "throttle", next((series for series in throttles if series is not None and len(series.time)), None)
 
     def _read_first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
         """Read a quantity that several messages state from the first of them that the log contains.
@@ -332,26 +334,19 @@ class _Reader:
             )
         if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
             return None
-        return LogSeries(
-            airspeed.source, airspeed.time, airspeed.values * self._find_true_airspeed_ratio(airspeed.time)[:, None]
-        )
-
-    def _find_true_airspeed_ratio(self, time: Floats) -> Floats:
-        """Return the ratio of true to equivalent airspeed at each time, (n,).
-
-        The logged ratio is used, or else the ratio in the standard atmosphere at the logged altitude, or else 1.
-        """
-        ratio = self._read_table("CTUN", ("E2T",))
-        if ratio is not None and len(ratio.time) > 1:
-            order = np.argsort(ratio.time, kind="stable")
-            return np.asarray(np.interp(time, ratio.time[order], ratio.values[order, 0]))
-        position = self._read_position()
-        if position is None or not len(position.time):
-            return np.ones(len(time))
-        order = np.argsort(position.time, kind="stable")
-        # Limit implausible altitudes to the range of the standard atmosphere.
-        altitudes = np.clip(np.interp(time, position.time[order], position.values[order, 2]), -500.0, 20_000.0)
-        return np.array([eas_to_tas_ratio(float(altitude)) for altitude in altitudes])
+        # Ratio of true to equivalent airspeed: logged, or else of the standard atmosphere at the logged altitude, or 1.
+        time = airspeed.time
+        ratios = np.ones(len(time))
+        logged_ratio, position = self._read_table("CTUN", ("E2T",)), self._read_position()
+        if logged_ratio is not None and len(logged_ratio.time) > 1:
+            order = np.argsort(logged_ratio.time, kind="stable")
+            ratios = np.interp(time, logged_ratio.time[order], logged_ratio.values[order, 0])
+        elif position is not None and len(position.time):
+            order = np.argsort(position.time, kind="stable")
+            # Limit implausible altitudes to the range of the standard atmosphere.
+            altitudes = np.clip(np.interp(time, position.time[order], position.values[order, 2]), -500.0, 20_000.0)
+            ratios = np.array([eas_to_tas_ratio(float(altitude)) for altitude in altitudes])
+        return LogSeries(airspeed.source, time, airspeed.values * ratios[:, None])
 
     def _read_battery(self) -> LogSeries | None:
         """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured.
@@ -382,16 +377,6 @@ class _Reader:
             baro = self._read_table("BARO", ("Alt",))
             if baro is not None:
                 yield HeightSource("BARO.Alt (above the power-up position)", "unstated", baro)
-
-    def _read_modes(self) -> Iterable[ModeChange]:
-        """Yield the mode changes; nothing for a log that states modes by name instead of number."""
-        messages = self._select_messages("MODE")
-        column = "ModeNum" if messages.has("ModeNum") else "Mode"
-        if not messages.has(column) or messages.rows.dtype[column].kind == "S":
-            return
-        for time, number in zip(self._compute_times(messages).tolist(), messages.rows[column].tolist(), strict=True):
-            name, automatic = describe_plane_mode(int(number))
-            yield ModeChange(time, name, automatic)
 
     def _read_events(self) -> Iterable[tuple[float, str]]:
         """Yield the time (s) and the text of each MSG message."""

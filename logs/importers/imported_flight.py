@@ -4,6 +4,7 @@ A log may contain several flights, and each flight may follow several missions: 
 mission.  From it follow the altitudes for a plan that states none, the mean wind, and the track that is judged.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from flight.mission.items import Mission
-from flight.simulation.setup import DataKind, Gap, HeightOffset, Heights, MissionStretch, RowFaults
+from flight.simulation.setup import DataKind, Gap, HeightOffset, Heights, MissionStretch, RowFaults, StretchEnd
 from flight.simulation.track import THROTTLE, Track
 from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, measure_steps
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
@@ -97,7 +98,8 @@ def find_flight_parts(
 ) -> list[FlightPart]:
     """Split the flights of a log by the missions that they followed, one part for each flight and mission.
 
-    A flight that followed no mission is one part without stretches.
+    A flight followed its mission while the vehicle's mode was one that follows the mission, such as AUTO.  A flight
+    that followed no mission is one part without stretches.
 
     spans: start and end of each flight, from `find_flight_spans`.
     modes: mode changes in the log; without any, each whole flight is assumed to follow its mission.
@@ -105,8 +107,20 @@ def find_flight_parts(
     log_end: time of the last row of the log, s.
     """
     parts = []
+    sorted_modes = sorted(modes, key=lambda mode: mode.time)
     for start, end in spans:
-        stretches = _find_stretches(start, end, modes, log_end)
+        # A flight that continues to the log's last rows is cut off by the log.
+        flight_end: StretchEnd = "log" if log_end - end < CUT_FLIGHT_TIME_S else "landed"
+        stretches = [] if modes else [MissionStretch(start, end, "", flight_end)]
+        for mode, next_mode in itertools.zip_longest(sorted_modes, sorted_modes[1:]):
+            mode_end = math.inf if next_mode is None else next_mode.time
+            stretch_start, stretch_end = max(start, mode.time), min(end, mode_end)
+            if not mode.automatic or stretch_end <= stretch_start:
+                continue
+            if next_mode is not None and mode_end <= end:
+                stretches.append(MissionStretch(stretch_start, stretch_end, mode.name, "mode", next_mode.name))
+            else:
+                stretches.append(MissionStretch(stretch_start, stretch_end, mode.name, flight_end))
         stretches_by_mission: dict[int, list[MissionStretch]] = {}
         for stretch in stretches:
             stretches_by_mission.setdefault(_find_mission(stretch, missions), []).append(stretch)
@@ -117,32 +131,6 @@ def find_flight_parts(
             for number, mission_stretches in stretches_by_mission.items()
         ]
     return parts
-
-
-def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], log_end: float) -> list[MissionStretch]:
-    """Return the periods in which a flight followed its mission, and how each ended.
-
-    In these periods the vehicle's mode was one that follows the mission, such as AUTO.  In a log without mode changes
-    the whole flight is one period.
-
-    log_end: time of the last row of the log, s.
-    """
-    # A flight that continues to the log's last rows is cut off by the log.
-    is_cut_off = log_end - end < CUT_FLIGHT_TIME_S
-    if not modes:
-        return [MissionStretch(start, end, "", "log" if is_cut_off else "landed")]
-    stretches = []
-    sorted_modes = sorted(modes, key=lambda mode: mode.time)
-    for k, mode in enumerate(sorted_modes):
-        mode_end = sorted_modes[k + 1].time if k + 1 < len(sorted_modes) else float("inf")
-        stretch_start, stretch_end = max(start, mode.time), min(end, mode_end)
-        if not mode.automatic or stretch_end <= stretch_start:
-            continue
-        if mode_end <= end:
-            stretches.append(MissionStretch(stretch_start, stretch_end, mode.name, "mode", sorted_modes[k + 1].name))
-        else:
-            stretches.append(MissionStretch(stretch_start, stretch_end, mode.name, "log" if is_cut_off else "landed"))
-    return stretches
 
 
 def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:

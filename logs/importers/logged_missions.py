@@ -1,6 +1,6 @@
 """Read content that is common to several log formats: missions, and the flight modes of ArduPlane and PX4."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -72,28 +72,21 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     combined: list[LoggedItemGroup] = []
     for (start, items), total in zip(missions, totals, strict=True):
         logged = LoggedItemGroup(start, total, tuple(items[seq] for seq in sorted(items)))
-        if combined and _is_same_mission(combined[-1], logged):
-            previous = combined[-1]
-            merged = {item.seq: item for item in (*previous.items, *logged.items)}
-            combined[-1] = LoggedItemGroup(
-                previous.time, total or previous.total, tuple(merged[seq] for seq in sorted(merged))
-            )
+        previous = combined[-1] if combined else LoggedItemGroup(start, 0, ())
+        previous_items = {item.seq: item for item in previous.items}
+        common = [item for item in logged.items if item.seq in previous_items]
+        # It is the same mission if all items are equal, or if the announced numbers of items and all common items are
+        # equal.  Item 0, which is home, is ignored, because it is the same in all missions flown from a place.
+        is_whole = len(common) == len(previous.items) == len(logged.items)
+        is_announced = previous.total == total > 0 and any(item.seq > 0 for item in common)
+        is_equal = all(_is_same_item(previous_items[item.seq], item) for item in common)
+        if combined and is_equal and (is_whole or is_announced):
+            merged = previous_items | {item.seq: item for item in logged.items}
+            merged_items = tuple(merged[seq] for seq in sorted(merged))
+            combined[-1] = LoggedItemGroup(previous.time, total or previous.total, merged_items)
         else:
             combined.append(logged)
     return combined
-
-
-def _is_same_mission(first: LoggedItemGroup, second: LoggedItemGroup) -> bool:
-    """Return True if two groups of items are the same mission.
-
-    This is the case if all items are equal, or if the announced numbers of items and all common items are equal.  Item
-    0, which is home, is ignored, because it is the same in all missions flown from a place.
-    """
-    first_items = {item.seq: item for item in first.items}
-    common = [item for item in second.items if item.seq in first_items]
-    is_whole = len(common) == len(first.items) == len(second.items)
-    is_announced = first.total == second.total > 0 and any(item.seq > 0 for item in common)
-    return (is_whole or is_announced) and all(_is_same_item(first_items[item.seq], item) for item in common)
 
 
 def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
@@ -185,22 +178,19 @@ def without_gaps(logged: LoggedMission, total: int, last_number: int) -> LoggedM
         if runs[-1] and item.seq != runs[-1][-1].seq + 1:
             runs.append([])
         runs[-1].append(item)
-    run = max((_cut_before_jump_out(run) for run in runs), key=len)
+    for run in runs:
+        indices = {float(item.seq): k for k, item in enumerate(run)}
+        end = len(run)
+        jumps = [(indices.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
+        # The farthest targets come first, because items that one jump cuts off may be the targets of another jump.
+        for target, k in sorted(jumps, reverse=True):
+            if target >= end:
+                end = min(end, k)
+        del run[end:]
+    run = max(runs, key=len)
     first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
     missing_items = MissingItems(missing, total, first, last, last_number)
     return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=missing_items)
-
-
-def _cut_before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the items of a run before its first DO_JUMP to an item outside the run."""
-    indices = {float(item.seq): k for k, item in enumerate(run)}
-    end = len(run)
-    jumps = [(indices.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
-    # The farthest targets come first, because items that one jump cuts off may be the targets of another jump.
-    for target, k in sorted(jumps, reverse=True):
-        if target >= end:
-            end = min(end, k)
-    return run[:end]
 
 
 # ----------------------------------------------------------------------

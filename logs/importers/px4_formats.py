@@ -6,7 +6,6 @@ log declares the topic.
 """
 
 import re
-from collections.abc import Iterator
 
 from world.errors import LogError
 
@@ -43,7 +42,9 @@ class MessageFormats:
         4
         """
         name, _, fields = text.partition(":")
-        self._formats[name] = list(_parse_field_types(fields))
+        # Type of each field, and its number of elements: 1, or the length of an array.
+        matches = map(_FIELD.match, fields.split(";"))
+        self._formats[name] = [(match[1], int(match[2] or 1)) for match in matches if match]
         self._counts.clear()
 
     def add_topic(self, name: str) -> None:
@@ -82,10 +83,3 @@ class MessageFormats:
                     break
             self._counts[name] = total
         return self._counts[name]
-
-
-def _parse_field_types(fields: str) -> Iterator[tuple[str, int]]:
-    """Yield the type of each field, and its number of elements: 1, or the length of an array."""
-    for field in fields.split(";"):
-        if match := _FIELD.match(field):
-            yield match[1], int(match[2] or 1)

@@ -242,20 +242,53 @@ class Topics:
 
     def to_raw_log(self) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
-        series = {name: values for name, values in self._read_series() if values is not None and len(values.time)}
+        position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
+        gps = self._read_gps_position()
+        velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
+        if velocity is None:
+            velocity = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
+        if velocity is not None:
+            velocity = LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
+        winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
+        battery = self.battery()
+        tables = {
+            "position": position if position is not None else gps,
+            "velocity": velocity,
+            "attitude": self.attitude(),
+            "airspeed": self._read_airspeed(),
+            "wind": next((wind for wind in winds if wind is not None and np.any(wind.values)), None),
+            "battery": None if battery is None else with_used_energy(battery),
+            "throttle": self.table("actuator_controls_0", ("control[3]",)),
+        }
+        series = {name: table for name, table in tables.items() if table is not None and len(table.time)}
         if "position" not in series:
             raise LogError(
                 f"{self._source}: no vehicle_global_position: the flown position is unknown", file=self._source
             )
+        # Altitudes in the log other than the altitude of the position.
+        heights = []
+        if gps is not None and "vehicle_global_position" in self._data:
+            gps_altitudes = LogSeries(gps.source, gps.time, gps.values[:, 2:])
+            heights.append(HeightSource(f"{gps.source}.alt", "amsl", gps_altitudes))
+        baro = self.table("vehicle_air_data", ("baro_alt_meter",))
+        if baro is not None:
+            heights.append(HeightSource("vehicle_air_data.baro_alt_meter", "pressure", baro))
+        # Changes of the navigation state, the first state included.
+        modes, last_state = [], -1
+        status = self._data.get("vehicle_status", {})
+        for time, state in zip(status.get("timestamp", ()), status.get("nav_state", ()), strict=False):
+            if state != last_state:
+                modes.append(ModeChange(float(time) * 1e-6, *describe_px4_state(int(state))))
+                last_state = state
         return RawLog(
             source=self._source,
             format=FORMAT,
             program=self.program(),
             vehicle=self.vehicle(),
             series=series,
-            heights=tuple(self._read_heights()),
+            heights=tuple(heights),
             datum="amsl",
-            modes=tuple(self._read_modes()),
+            modes=tuple(modes),
             missions=tuple(self._read_missions()),
             parameters=self.parameters(),
             events=tuple((message.timestamp * 1e-6, str(message.message)) for message in self._log.logged_messages),
@@ -274,25 +307,6 @@ class Topics:
         choices: alternative groups of fields; the first group that the topic has is returned.
         """
         return _read_instance_table(topic, self._data.get(topic, {}), choices)
-
-    def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
-        position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
-        yield "position", position if position is not None else self._read_gps_position()
-        velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
-        if velocity is None:
-            velocity = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
-        ground_velocity = None
-        if velocity is not None:
-            ground_velocity = LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
-        yield "velocity", ground_velocity
-        yield "attitude", self.attitude()
-        yield "airspeed", self._read_airspeed()
-        winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
-        yield "wind", next((wind for wind in winds if wind is not None and np.any(wind.values)), None)
-        battery = self.battery()
-        yield "battery", None if battery is None else with_used_energy(battery)
-        yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
     def _read_gps_position(self) -> LogSeries | None:
         """Return latitude, longitude (deg) and altitude (m AMSL) from GPS, (n, 3); None if not logged."""
@@ -355,26 +369,6 @@ class Topics:
         )
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
 
-    def _read_heights(self) -> Iterable[HeightSource]:
-        """Yield the altitudes in the log other than the altitude of the position."""
-        gps = self._read_gps_position()
-        if gps is not None and "vehicle_global_position" in self._data:
-            yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
-        baro = self.table("vehicle_air_data", ("baro_alt_meter",))
-        if baro is not None:
-            yield HeightSource("vehicle_air_data.baro_alt_meter", "pressure", baro)
-
-    def _read_modes(self) -> Iterable[ModeChange]:
-        """Yield the changes of the navigation state, the first state included."""
-        data = self._data.get("vehicle_status", {})
-        if "nav_state" not in data:
-            return
-        last_state = -1
-        for time, state in zip(data["timestamp"].tolist(), data["nav_state"].tolist(), strict=True):
-            if state != last_state:
-                yield ModeChange(time * 1e-6, *describe_px4_state(int(state)))
-                last_state = state
-
     def vehicle(self) -> VehicleKind:
         """Return the kind of vehicle; a VTOL is a plane."""
         data = self._data.get("vehicle_status", {})
@@ -389,12 +383,27 @@ class Topics:
         return "unknown"
 
     def _read_missions(self) -> Iterable[LoggedMission]:
-        """Yield the one mission of the log, with the items that became current: PX4 logs no other items.
+        """Yield the one mission of the log, with the valid items that became current: PX4 logs no other items.
 
         The number of items comes from mission_result.  Nothing is yielded if the log has neither.
         """
-        items = self._read_items()
-        stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
+        data = self._data.get("navigator_mission_item", {})
+        stamps = data.get("timestamp", [0.0])
+        columns = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
+        # Items by their number from 0.
+        items: dict[int, MissionItem] = {}
+        for k in range(len(stamps) if all(name in data for name in columns) else 0):
+            number, command, lat, lon, up = (float(data[name][k]) for name in columns)
+            # Check before the conversion to int, because garbage may be too large.
+            has_position = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
+            if not (has_position and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
+                continue
+            frame = _OVER_HOME if "altitude_is_relative" in data and data["altitude_is_relative"][k] else _AMSL
+            radius = float(data["acceptance_radius"][k]) if "acceptance_radius" in data else 0.0
+            position = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
+            item = MissionItem(int(number), int(command), frame, (0.0, radius, 0.0, 0.0), *position)
+            if item_problem(item) is None:
+                items.setdefault(item.seq, item)
         mission_result = self._data.get("mission_result", {})
         total = 0
         if "seq_total" in mission_result:
@@ -411,30 +420,6 @@ class Topics:
         gapless_mission = without_gaps(logged, total, max([total, *(item.seq for item in flown_items[-1:])]))
         if gapless_mission is not None:
             yield gapless_mission
-
-    def _read_items(self) -> dict[int, MissionItem]:
-        """Return the valid items that became current, by their number from 0; other items are not in the log."""
-        data = self._data.get("navigator_mission_item", {})
-        columns = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
-        items: dict[int, MissionItem] = {}
-        if not all(name in data for name in columns):
-            return items
-        count = len(data["timestamp"])
-        is_relative = data.get("altitude_is_relative", np.zeros(count))
-        radius = data.get("acceptance_radius", np.zeros(count))
-        for k in range(count):
-            number, command, lat, lon, up = (float(data[name][k]) for name in columns)
-            # Check before the conversion to int, because garbage may be too large.
-            has_position = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
-            if not (has_position and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
-                continue
-            frame = _OVER_HOME if is_relative[k] else _AMSL
-            params = (0.0, float(radius[k]), 0.0, 0.0)
-            position = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
-            item = MissionItem(int(number), int(command), frame, params, *position)
-            if item_problem(item) is None:
-                items.setdefault(item.seq, item)
-        return items
 
     def home(self) -> Home | None:
         """Return the last valid home; None if not logged."""

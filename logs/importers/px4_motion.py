@@ -5,14 +5,13 @@ allocation (CA_*), or from `actuator_controls_0` in logs of releases before 1.14
 parameter references.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from logs.importers.motion import MotionLog, Samples, find_first_ground_position, sort_samples
 from logs.importers.px4_log import WIND_TOPICS, Topics, open_topics
-from world.arrays import Flags, Floats
 from world.errors import LogError
 
 _TOPICS = [
@@ -100,6 +99,13 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
         home, battery = topics.home(), topics.battery()
         height = NO_SAMPLES if not len(place.time) else Samples(place.time, place.values[:, 2:])
         winds = (_read_samples(topics, topic, ("windspeed_north", "windspeed_east")) for topic in WIND_TOPICS)
+        # Periods in which a VTOL flew on lifting motors or in transition.
+        kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
+        hover_periods: list[tuple[float, float]] = []
+        if kinds is not None:
+            is_plane = (kinds.values[:, 0] == _FIXED_WING) & (kinds.values[:, 1:] == 0.0).all(axis=1)
+            ends = np.append(kinds.time[1:], np.inf)
+            hover_periods = list(zip(kinds.time[~is_plane].tolist(), ends[~is_plane].tolist(), strict=True))
         return MotionLog(
             source=str(path),
             sha256=digest,
@@ -125,7 +131,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
             program_kind="px4",
             controls=controls,
             elevons=elevons,
-            hovering=tuple(_find_hover_periods(topics)),
+            hovering=tuple(hover_periods),
         )
 
 
@@ -185,20 +191,6 @@ def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
     return sort_samples(time, values[:, :1]), sort_samples(time[is_moving], ratio)
 
 
-def _find_hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
-    """Yield start and end (s) of each period in which a VTOL flew on lifting motors or in transition."""
-    kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
-    if kinds is None:
-        return
-    is_plane = kinds.values[:, 0] == _FIXED_WING
-    if kinds.values.shape[1] > 1:
-        is_plane &= kinds.values[:, 1] == 0.0
-    end_times = np.append(kinds.time[1:], np.inf)
-    for start, end, flies_as_plane in zip(kinds.time.tolist(), end_times.tolist(), is_plane.tolist(), strict=True):
-        if not flies_as_plane:
-            yield start, end
-
-
 def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
     """Return pitch, roll, yaw (fractions of travel) and throttle, (n, 4), and True if there are elevons.
 
@@ -210,7 +202,11 @@ def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Sam
     servos = _read_actuators(topics, "actuator_servos", _SERVOS)
     motors = _read_actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
-    is_known = np.isfinite(servos.values).any(axis=1) & _is_armed(topics, servos.time)
+    is_known = np.isfinite(servos.values).any(axis=1)
+    states = _read_samples(topics, "vehicle_status", ("arming_state",))
+    if len(states.time):
+        state_rows = np.clip(np.searchsorted(states.time, servos.time, side="right") - 1, 0, None)
+        is_known &= states.values[state_rows, 0] == _ARMED
     servos = Samples(servos.time[is_known], servos.values[is_known])
     if len(servos.time) < 2 or len(motors.time) < 2:
         # Roll, pitch, yaw and throttle before the mixer, in logs of old releases.
@@ -292,15 +288,6 @@ def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:
     # `sort_samples` leaves out rows with NaN: sort the row numbers instead of the values.
     row_numbers = sort_samples(table.time, np.arange(len(table.time), dtype=np.float64)[:, np.newaxis])
     return Samples(row_numbers.time, table.values[row_numbers.values[:, 0].astype(np.intp)])
-
-
-def _is_armed(topics: Topics, time: Floats) -> Flags:
-    """Return a mask of n times: True when the vehicle was armed; all True if the log does not state it."""
-    states = _read_samples(topics, "vehicle_status", ("arming_state",))
-    if not len(states.time):
-        return np.ones(len(time), np.bool_)
-    rows = np.clip(np.searchsorted(states.time, time, side="right") - 1, 0, None)
-    return np.asarray(states.values[rows, 0] == _ARMED)
 
 
 def _make_parameter_error(topics: Topics, field: str, value: float, message: str) -> LogError:

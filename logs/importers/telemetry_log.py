@@ -22,7 +22,6 @@ from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile
 from logs.importers.logged_missions import (
     LoggedItem,
-    LoggedItemGroup,
     combine_items,
     describe_plane_mode,
     describe_px4_mode,
@@ -95,7 +94,14 @@ class TelemetryReader:
             if position >= piece_end:
                 self.release_memory()
                 piece_end = position + PIECE_BYTES
-            length = self._find_record_length(position)
+            # Length of the record, including its time, bytes; 0 if no record begins here.
+            length, packet = 0, position + _STAMP.size
+            stamp = _STAMP.unpack_from(self.data, position)[0]
+            if _EARLIEST_US <= stamp <= _LATEST_US and self.data[packet] == _V1:
+                length = _STAMP.size + _V1_FRAME + self.data[packet + 1]
+            elif _EARLIEST_US <= stamp <= _LATEST_US and self.data[packet] == _V2:
+                signature_size = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
+                length = _STAMP.size + _V2_FRAME + self.data[packet + 1] + signature_size
             if length == 0:
                 self.places += is_in_record
                 self.size += 1
@@ -106,7 +112,6 @@ class TelemetryReader:
                 self.cut = True
                 break
             is_in_record = True
-            packet = position + _STAMP.size
             # MAVLink 1 has the number in byte 5, MAVLink 2 in bytes 7 to 9.
             message_number = (
                 self.data[packet + 5]
@@ -114,7 +119,6 @@ class TelemetryReader:
                 else self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
             )
             if message_number in self.wanted:
-                stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
                 payload = bytes(self.data[position + _STAMP.size : position + length])
                 try:
                     message = self._decoder.decode(bytearray(payload))
@@ -123,29 +127,12 @@ class TelemetryReader:
                 if message is None:
                     self.unreadable += 1
                 else:
-                    yield stamp, message
+                    yield stamp * 1e-6, message
             position += length
 
     def damage(self) -> Damage:
         """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
-
-    def _find_record_length(self, position: int) -> int:
-        """Return the length of the record at a position, including its time, bytes.
-
-        Return 0 if no record begins there.
-        """
-        stamp = _STAMP.unpack_from(self.data, position)[0]
-        if not _EARLIEST_US <= stamp <= _LATEST_US:
-            return 0
-        packet = position + _STAMP.size
-        magic, payload_size = self.data[packet], self.data[packet + 1]
-        if magic == _V1:
-            return _STAMP.size + _V1_FRAME + payload_size
-        if magic == _V2:
-            signature_size = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
-            return _STAMP.size + _V2_FRAME + payload_size + signature_size
-        return 0
 
 
 # ----------------------------------------------------------------------
@@ -355,6 +342,24 @@ class VehicleMessages:
             name = _decode_text(message.param_id)
             if name and math.isfinite(message.param_value):
                 parameters[name] = float(message.param_value)
+        # Altitudes in the log other than the altitude of the position.
+        heights = []
+        gps = self._read_gps_position()
+        if gps is not None and len(self._messages.table("GLOBAL_POSITION_INT")):
+            gps_altitudes = LogSeries(gps.source, gps.time, gps.values[:, 2:])
+            heights.append(HeightSource("GPS_RAW_INT.alt", "amsl", gps_altitudes))
+        hud = self.table("VFR_HUD", ("alt",))
+        if hud is not None:
+            heights.append(HeightSource("VFR_HUD.alt", "amsl", hud))
+        # Changes of the vehicle's mode, the first mode included.
+        modes, last_mode = [], None
+        for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
+            if _is_vehicle(heartbeat):
+                describe_mode = describe_px4_mode if heartbeat.autopilot == _PX4 else describe_plane_mode
+                mode = describe_mode(heartbeat.custom_mode)
+                if mode != last_mode:
+                    modes.append(ModeChange(time, *mode))
+                    last_mode = mode
         # ArduPilot's start message names its version; other programs are named by their autopilot.
         texts = (_decode_text(message.text) for _, message in self._named_messages.get("STATUSTEXT", []))
         autopilot = _NAMES.get(heartbeats[0].autopilot, "")
@@ -364,9 +369,9 @@ class VehicleMessages:
             program=next((text for text in texts if "Ardu" in text and " V" in text), autopilot),
             vehicle=_TYPES.get(heartbeats[0].type, "unknown"),
             series=series,
-            heights=tuple(self._read_heights()),
+            heights=tuple(heights),
             datum="amsl",
-            modes=tuple(self._read_modes()),
+            modes=tuple(modes),
             missions=tuple(self._read_missions()),
             parameters=parameters,
             events=tuple(
@@ -465,30 +470,6 @@ class VehicleMessages:
         is_measured = np.all([table.values[:, k] != NOT_MEASURED[column] for k, column in enumerate(columns)], axis=0)
         return LogSeries(name, table.time[is_measured], table.values[is_measured]) if is_measured.any() else None
 
-    def _read_heights(self) -> Iterable[HeightSource]:
-        """Yield the altitudes in the log other than the altitude of the position."""
-        gps = self._read_gps_position()
-        if gps is not None and len(self._messages.table("GLOBAL_POSITION_INT")):
-            yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
-        hud = self.table("VFR_HUD", ("alt",))
-        if hud is not None:
-            yield HeightSource("VFR_HUD.alt", "amsl", hud)
-
-    def _read_modes(self) -> Iterable[ModeChange]:
-        """Yield the changes of the vehicle's mode, the first mode included."""
-        last_mode: tuple[str, bool] | None = None
-        for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
-            if not _is_vehicle(heartbeat):
-                continue
-            mode = (
-                describe_px4_mode(heartbeat.custom_mode)
-                if heartbeat.autopilot == _PX4
-                else describe_plane_mode(heartbeat.custom_mode)
-            )
-            if mode != last_mode:
-                yield ModeChange(time, *mode)
-                last_mode = mode
-
     def _read_missions(self) -> Iterable[LoggedMission]:
         """Yield the missions whose items a station uploaded or downloaded."""
         rows: list[LoggedItem] = []
@@ -500,12 +481,22 @@ class VehicleMessages:
             if kind == "MISSION_COUNT":
                 total, begins_mission = message.count, True
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-                rows.append(
-                    LoggedItem(time, total, _parse_item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission)
-                )
+                # In a MISSION_ITEM_INT, latitude and longitude are integers of 1e-7 degrees.
+                degrees = 1e-7 if kind == "MISSION_ITEM_INT" else 1.0
+                params = (float(message.param1), float(message.param2), float(message.param3), float(message.param4))
+                position = round_to_grid(message.x * degrees), round_to_grid(message.y * degrees), round(message.z, 6)
+                item = MissionItem(int(message.seq), int(message.command), int(message.frame), params, *position)
+                rows.append(LoggedItem(time, total, item, begins_mission))
                 begins_mission = False
         for logged in combine_items(rows):
-            mission = (_make_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
+            if self.is_px4:
+                # Items of PX4 are numbered from 0 and contain no home.
+                items = renumber_px4_items(logged.items)
+                px4_mission = Mission(home=None, items=items, source=f"{self._source}: mission items")
+                end = max(logged.total, items[-1].seq)
+                mission = without_gaps(LoggedMission(logged.time, px4_mission, "mission items"), logged.total, end)
+            else:
+                mission = make_logged_mission(logged, self._source, "mission items")
             if mission is not None:
                 # The home in an uploaded mission is only an assumption of the ground station; the last home that the
                 # vehicle reported replaces it.
@@ -541,26 +532,3 @@ def _decode_text(value: str | bytes) -> str:
     """Return a text field up to its first zero byte, without surrounding spaces."""
     text = value.decode("latin-1") if isinstance(value, bytes) else value
     return text.partition("\0")[0].strip()
-
-
-def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
-    """Convert a MAVLink mission message to a mission item.
-
-    scaled: True if latitude and longitude are integers of 1e-7 degrees.
-    """
-    command, frame = int(message.command), int(message.frame)
-    lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
-    params = (float(message.param1), float(message.param2), float(message.param3), float(message.param4))
-    return MissionItem(
-        int(message.seq), command, frame, params, round_to_grid(lat), round_to_grid(lon), round(message.z, 6)
-    )
-
-
-def _make_px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission from logged items of PX4, which are numbered from 0 and contain no home.
-
-    Return None if the mission is complete but has fewer than two items.
-    """
-    mission = Mission(home=None, items=renumber_px4_items(logged.items), source=f"{source}: {origin}")
-    end = max(logged.total, mission.items[-1].seq)
-    return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

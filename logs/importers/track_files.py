@@ -116,6 +116,16 @@ def read_gpx(path: Path) -> RawLog:
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])
     start = _find_earliest_time(stamps)
+    # Routes of at least two points are missions.
+    missions = []
+    for route in gpx.routes:
+        has_altitudes = all(point.elevation is not None for point in route.points)
+        items = _make_waypoint_items(
+            [(point.latitude, point.longitude, float(point.elevation or 0.0)) for point in route.points]
+        )
+        if len(items) > 1:
+            mission = Mission(home=None, items=items, source=f"{path}: route {route.name or ''}".rstrip())
+            missions.append(LoggedMission(0.0, mission, "route", has_altitudes))
     up = [math.nan if point.elevation is None else point.elevation for point in timed]
     values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
     return RawLog(
@@ -126,34 +136,27 @@ def read_gpx(path: Path) -> RawLog:
         series={"position": LogSeries("trkpt", stamps - start, values)},
         heights=(),
         datum="unstated",
-        missions=tuple(_make_routes(gpx, str(path))),
+        missions=tuple(missions),
         clock="start",
         utc_start=start,
         damage=Damage(unreadable=len(points) - len(timed)),
     )
 
 
-def _make_routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
-    """Return the routes of a GPX file with at least two points as missions."""
-    missions = []
-    for route in gpx.routes:
-        has_altitudes = all(point.elevation is not None for point in route.points)
-        items = tuple(
-            MissionItem(
-                number,
-                int(Command.NAV_WAYPOINT),
-                int(Frame.GLOBAL),
-                (0.0,) * 4,
-                round_to_grid(point.latitude),
-                round_to_grid(point.longitude),
-                float(point.elevation or 0.0),
-            )
-            for number, point in enumerate(route.points, 1)
+def _make_waypoint_items(points: list[tuple[float, float, float]]) -> tuple[MissionItem, ...]:
+    """Make a waypoint at each point: latitude and longitude, deg, and altitude, m AMSL."""
+    return tuple(
+        MissionItem(
+            number,
+            int(Command.NAV_WAYPOINT),
+            int(Frame.GLOBAL),
+            (0.0,) * 4,
+            round_to_grid(lat),
+            round_to_grid(lon),
+            up,
         )
-        if len(items) > 1:
-            mission = Mission(home=None, items=items, source=f"{source}: route {route.name or ''}".rstrip())
-            missions.append(LoggedMission(0.0, mission, "route", has_altitudes))
-    return missions
+        for number, (lat, lon, up) in enumerate(points, 1)
+    )
 
 
 # ----------------------------------------------------------------------
@@ -181,7 +184,20 @@ def read_igc(path: Path) -> RawLog:
     The altitude is the GNSS altitude if most fixes have one, otherwise the pressure altitude.
     """
     lines = re.split(r"\r\n|\n|\r", read_track_text(path, xml=False))
-    rows, unreadable = _parse_fixes(lines)
+    # A row is the second of the day, latitude and longitude (deg), and pressure and GNSS altitude (m; NaN if missing).
+    rows, unreadable = [], 0
+    for line in lines:
+        match = _FIX.match(line)
+        if match is not None:
+            # The fields are four for the latitude, four for the longitude, the validity ("A" for a 3-D fix), and
+            # pressure and GNSS altitude.
+            hour, minute, second, *fields = match.groups()
+            lat, lon = _parse_degrees(*fields[:4]), _parse_degrees(*fields[4:8])
+            gnss_altitude = float(fields[10]) if fields[8] == "A" else math.nan
+            seconds = int(hour) * 3600.0 + int(minute) * 60.0 + int(second)
+            rows.append((seconds, lat, lon, float(fields[9]), gnss_altitude))
+        elif line.startswith("B"):
+            unreadable += 1
     if len(rows) < 2:
         raise LogError(f"{path}: {len(rows)} fixes (B records); expected at least 2", file=path)
     table = np.array(rows)
@@ -193,7 +209,14 @@ def read_igc(path: Path) -> RawLog:
     gnss, pressure = table[:, 4], table[:, 3]
     has_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
     up, source = (gnss, "B record, GNSS altitude") if has_gnss else (pressure, "B record, pressure altitude")
-    midnight = _parse_midnight(lines)
+    # UTC midnight before the flight, s since 1970.  The file's years have two digits: 80 to 99 are 1980 to 1999.
+    dates = [[int(part) for part in match.groups()] for match in map(_DATE.match, lines) if match]
+    midnights = (
+        float(calendar.timegm((1900 + year if year >= 80 else 2000 + year, month, day, 0, 0, 0)))
+        for day, month, year in dates
+        if 1 <= month <= 12 and 1 <= day <= 31
+    )
+    midnight = next(midnights, math.nan)
     start = float(time.min())
     pressure_heights = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
     recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
@@ -223,42 +246,6 @@ def _parse_degrees(degrees: str, minutes: str, thousandths: str, side: str) -> f
     return -value if side in "SW" else value
 
 
-def _parse_fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
-    """Return the readable fixes, and the number of unreadable ones.
-
-    A fix is the second of the day, latitude and longitude (deg), and pressure and GNSS altitude (m; NaN if missing).
-    """
-    rows, unreadable = [], 0
-    for line in lines:
-        if not line.startswith("B"):
-            continue
-        match = _FIX.match(line)
-        if match is None:
-            unreadable += 1
-            continue
-        # The fields are four for the latitude, four for the longitude, the validity ("A" for a 3-D fix), and pressure
-        # and GNSS altitude.
-        hour, minute, second, *fields = match.groups()
-        lat, lon = _parse_degrees(*fields[:4]), _parse_degrees(*fields[4:8])
-        gnss = float(fields[10]) if fields[8] == "A" else math.nan
-        rows.append((int(hour) * 3600.0 + int(minute) * 60.0 + int(second), lat, lon, float(fields[9]), gnss))
-    return rows, unreadable
-
-
-def _parse_midnight(lines: list[str]) -> float:
-    """Return the UTC midnight before the flight, s since 1970; NaN if no line has a valid date.
-
-    The file's years have two digits: 80 to 99 are 1980 to 1999.
-    """
-    for line in lines:
-        match = _DATE.match(line)
-        if match:
-            day, month, year = (int(part) for part in match.groups())
-            if 1 <= month <= 12 and 1 <= day <= 31:
-                return float(calendar.timegm((1900 + year if year >= 80 else 2000 + year, month, day, 0, 0, 0)))
-    return math.nan
-
-
 def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     """Return the declared task as a mission, or () if it has fewer than two turn points.
 
@@ -270,21 +257,10 @@ def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
         if match:
             lat, lon = _parse_degrees(*match.groups()[:4]), _parse_degrees(*match.groups()[4:])
             if (lat, lon) != (0.0, 0.0):
-                points.append((lat, lon))
+                points.append((lat, lon, 0.0))
     # The first and the last point are the take-off and the landing on the ground, not turn points of the task.
     turn_points = points[1:-1] if len(points) > 3 else points
-    items = tuple(
-        MissionItem(
-            number,
-            int(Command.NAV_WAYPOINT),
-            int(Frame.GLOBAL),
-            (0.0,) * 4,
-            round_to_grid(lat),
-            round_to_grid(lon),
-            0.0,
-        )
-        for number, (lat, lon) in enumerate(turn_points, 1)
-    )
+    items = _make_waypoint_items(turn_points)
     if len(items) < 2:
         return ()
     return (

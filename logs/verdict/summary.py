@@ -43,7 +43,7 @@ _LEVEL_TITLES = {
 
 
 def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return headline notes on an uncertain aircraft and on a doubtful home altitude.
+    """Return headline notes on an uncertain aircraft, a doubtful home altitude, and a missing landing.
 
     There is no note on home's altitude if a finding already reports it.
     """
@@ -60,6 +60,9 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
             else ", which shifts all heights above home"
         )
         notes.append(home_text + effect_text)
+    limits = setup.autopilot.checks.feasibility
+    if setup.autopilot.checks.dialect == "px4" and not limits.stated and missing_ends_text(setup.mission, limits):
+        notes.append(f"by default (MIS_TKO_LAND_REQ {limits.requires}) PX4 rejects a mission without a landing")
     return tuple(notes)
 
 

@@ -40,7 +40,7 @@ LOITER_WIDENING_FRACTION = 0.25
 # m/s) it reached up to 2.09. It also stays within this distance of the last waypoint that the simulated PX4 circles:
 # up to 2.06 in 54 flights, in radii of that arc or of the loiter, whichever is larger.
 LOITER_SWING_RADII = 2.25
-# m.  A leg shorter than this is a vertical climb, with no course of its own.
+# m.  A leg shorter than this is a vertical leg, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5
 # rad.  Largest bank that is possible if the bank limit is only guessed; a lower limit of autopilot or scenario
 # replaces it. What passes only with this bank is undecided. It is the steepest bank that a data sheet or a scenario

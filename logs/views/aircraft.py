@@ -13,7 +13,6 @@ from aircraft.envelope import Envelope, turn_radius
 from flight.dynamics.characteristics import TRIM_AMSL, Mode, StepResponse, TrimRow
 from logs import theme
 from logs.views.drawing import clean_style, new_figure
-from world.arrays import Floats
 
 # Bank angles of the turns, degrees.
 _BANKS_DEG = (15, 20, 30, 40)
@@ -52,7 +51,7 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
     """
     with clean_style():
         figure = new_figure(8.0)
-        axes = figure.subplots(2, 2)
+        (slopes, levels), (ground_slopes, turns) = figure.subplots(2, 2)
         figure.subplots_adjust(left=0.075, right=0.975, top=0.87, bottom=0.065, wspace=0.2, hspace=0.32)
         if aircraft.battery_voltage == 0.0:
             descent_text = "throttle closed"
@@ -64,74 +63,51 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
             f"JSBSim trims; climbs at full throttle, descents: {descent_text}; shaded: the speeds that guidance uses"
         )
         _write_title(figure, f"{aircraft.title}: steady flight envelope", subtitle)
-        _draw_slopes(axes[0, 0], aircraft, envelope)
-        _draw_level_speeds(axes[0, 1], aircraft, envelope)
-        _draw_slopes_in_wind(axes[1, 0], aircraft, envelope)
-        _draw_turns(axes[1, 1], aircraft)
+        shades = [{"color": theme.SHADES[k], "linestyle": dashes, "linewidth": 1.3} for k, dashes in enumerate(_DASHES)]
+        # Steepest climb and descent over airspeed, a line for each of several altitudes.
+        columns = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
+        for style, column in zip(shades, columns, strict=True):
+            climb, descent = np.degrees(envelope.climb[:, column]), np.degrees(envelope.descent[:, column])
+            slopes.plot(envelope.airspeed, climb, label=f"{envelope.amsl[column]:.0f} m", **style)
+            slopes.plot(envelope.airspeed, -descent, **style)
+        slopes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
+        _shade_guidance_speeds(slopes, aircraft)
+        slopes_title = "steepest climb and descent relative to the air"
+        _set_up_axes(slopes, slopes_title, "airspeed (m/s)", "flight path (°)")
+        _add_legend_above(slopes, "altitude (AMSL)", 3)
+        # Slowest and fastest speed of level flight over altitude.
+        slowest, fastest = envelope.level_speed_min, envelope.level_speed_max
+        levels.fill_betweenx(envelope.amsl, slowest, fastest, color=theme.colour("planned"), alpha=0.2, linewidth=0)
+        slowest_style: dict[str, Any] = {"color": theme.colour("limit"), "linestyle": "--", "linewidth": 1.3}
+        levels.plot(slowest, envelope.amsl, label="slowest: elevator full up", **slowest_style)
+        levels.plot(fastest, envelope.amsl, color=theme.colour("second"), linewidth=1.3, label="fastest: full throttle")
+        _shade_guidance_speeds(levels, aircraft)
+        margin = 0.08 * float(np.nanmax(fastest) - np.nanmin(slowest))
+        levels.set_xlim(float(np.nanmin(slowest)) - margin, float(np.nanmax(fastest)) + margin)
+        _set_up_axes(levels, "level flight", "airspeed (m/s)", "altitude (m AMSL)")
+        _add_legend_above(levels, "", 2)
+        # Steepest climb and descent over the ground, a line for each head- or tailwind.
+        airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
+        for style, wind in zip(shades, _WINDS, strict=True):
+            limits = [envelope.slope_limits(float(airspeed), TRIM_AMSL, wind) for airspeed in airspeeds]
+            climb, descent = np.degrees(limits).T
+            name = "calm" if wind == 0.0 else f"{abs(wind):.0f} m/s {'tail' if wind > 0.0 else 'head'}wind"
+            ground_slopes.plot(airspeeds, climb, label=name, **style)
+            ground_slopes.plot(airspeeds, -descent, **style)
+        ground_slopes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
+        ground_title = f"steepest climb and descent over the ground, at {TRIM_AMSL:.0f} m"
+        _set_up_axes(ground_slopes, ground_title, "airspeed (m/s)", "slope (°)")
+        _add_legend_above(ground_slopes, "", 3)
+        # Turn radius over ground speed, a line for each bank angle.
+        speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max + 10.0, 80)
+        for style, bank in zip(shades, _BANKS_DEG, strict=False):
+            radii = [turn_radius(float(speed), math.radians(bank)) for speed in speeds]
+            turns.plot(speeds, radii, label=f"{bank}° of bank", **style)
+        _shade_guidance_speeds(turns, aircraft)
+        _set_up_axes(turns, "turn radius", "ground speed (m/s)", "radius (m)")
+        turns.set_ylim(0.0, None)
+        _add_legend_above(turns, "", 2)
     return figure
-
-
-def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
-    """Draw the steepest climb and descent over airspeed, a line for each of several altitudes."""
-    altitude_columns = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
-    for k, column in enumerate(altitude_columns):
-        style = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
-        axes.plot(
-            envelope.airspeed, np.degrees(envelope.climb[:, column]), label=f"{envelope.amsl[column]:.0f} m", **style
-        )
-        axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, column]), **style)
-    axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
-    _shade_guidance_speeds(axes, aircraft)
-    _set_up_axes(axes, "steepest climb and descent relative to the air", "airspeed (m/s)", "flight path (°)")
-    _add_legend_above(axes, "altitude (AMSL)", 3)
-
-
-def _draw_level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
-    """Draw the slowest and fastest speed of level flight over altitude."""
-    min_speeds, max_speeds = envelope.level_speed_min, envelope.level_speed_max
-    axes.fill_betweenx(envelope.amsl, min_speeds, max_speeds, color=theme.colour("planned"), alpha=0.2, linewidth=0)
-    axes.plot(
-        min_speeds,
-        envelope.amsl,
-        color=theme.colour("limit"),
-        linestyle="--",
-        linewidth=1.3,
-        label="slowest: elevator full up",
-    )
-    axes.plot(max_speeds, envelope.amsl, color=theme.colour("second"), linewidth=1.3, label="fastest: full throttle")
-    _shade_guidance_speeds(axes, aircraft)
-    span = float(np.nanmax(max_speeds) - np.nanmin(min_speeds))
-    axes.set_xlim(float(np.nanmin(min_speeds)) - 0.08 * span, float(np.nanmax(max_speeds)) + 0.08 * span)
-    _set_up_axes(axes, "level flight", "airspeed (m/s)", "altitude (m AMSL)")
-    _add_legend_above(axes, "", 2)
-
-
-def _draw_slopes_in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
-    """Draw the steepest climb and descent over the ground, a line for each head- or tailwind."""
-    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
-    for k, wind in enumerate(_WINDS):
-        climb, dive = np.degrees([envelope.slope_limits(float(speed), TRIM_AMSL, wind) for speed in speeds]).T
-        name = "calm" if wind == 0.0 else f"{abs(wind):.0f} m/s {'tail' if wind > 0.0 else 'head'}wind"
-        style = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
-        axes.plot(speeds, climb, label=name, **style)
-        axes.plot(speeds, -dive, **style)
-    axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
-    _set_up_axes(
-        axes, f"steepest climb and descent over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)"
-    )
-    _add_legend_above(axes, "", 3)
-
-
-def _draw_turns(axes: Any, aircraft: Aircraft) -> None:
-    """Draw the turn radius over ground speed, a line for each bank angle."""
-    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max + 10.0, 80)
-    for k, bank in enumerate(_BANKS_DEG):
-        radii = [turn_radius(float(speed), math.radians(bank)) for speed in speeds]
-        axes.plot(speeds, radii, color=theme.SHADES[k], linestyle=_DASHES[k], linewidth=1.3, label=f"{bank}° of bank")
-    _shade_guidance_speeds(axes, aircraft)
-    _set_up_axes(axes, "turn radius", "ground speed (m/s)", "radius (m)")
-    axes.set_ylim(0.0, None)
-    _add_legend_above(axes, "", 2)
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
@@ -174,34 +150,24 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
         axes[0, 0].axhline(0.0, color=theme.colour("area"), linewidth=0.8)
         _set_up_axes(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
         _add_legend_above(axes[0, 0], "", 2)
-        _draw_power(axes[0, 1], aircraft, speeds, trims)
+        # Throttle and power over airspeed, with an axis for each.
+        throttle_axes = axes[0, 1]
+        throttles = [100.0 * row.trim.throttle for row in trims]
+        throttle_axes.plot(speeds, throttles, "o-", color=theme.colour("flown"), markersize=3, label="throttle")
+        power_name = "battery power" if aircraft.battery_voltage > 0.0 else "heat of the fuel"
+        power_axes = throttle_axes.twinx()
+        power = np.array([row.power for row in trims]) / 1000.0
+        power_style: dict[str, Any] = {"linestyle": "--", "color": theme.colour("second"), "markersize": 3}
+        power_axes.plot(speeds, power, "s", label=f"{power_name} (right)", **power_style)
+        power_axes.set_ylabel("power (kW)")
+        power_axes.set_ylim(0.0, 1.15 * float(power.max(initial=0.1)))
+        throttle_axes.set_ylim(0.0, 105.0)
+        _set_up_axes(throttle_axes, "throttle and power", "airspeed (m/s)", "throttle (%)")
+        lines = [*throttle_axes.get_lines(), *power_axes.get_lines()]
+        throttle_axes.legend(lines, [line.get_label() for line in lines], loc="lower right")
         _draw_roots(axes[1, 0], modes, all_modes=True)
         _draw_roots(axes[1, 1], modes, all_modes=False)
     return figure
-
-
-def _draw_power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRow]) -> None:
-    """Draw throttle and power of level flight over airspeed, with an axis for each."""
-    axes.plot(
-        speeds,
-        [100.0 * row.trim.throttle for row in trims],
-        "o-",
-        color=theme.colour("flown"),
-        markersize=3,
-        label="throttle",
-    )
-    power_name = "battery power" if aircraft.battery_voltage > 0.0 else "heat of the fuel"
-    power_axes = axes.twinx()
-    power = np.array([row.power for row in trims]) / 1000.0
-    power_axes.plot(
-        speeds, power, "s", linestyle="--", color=theme.colour("second"), markersize=3, label=f"{power_name} (right)"
-    )
-    power_axes.set_ylabel("power (kW)")
-    power_axes.set_ylim(0.0, 1.15 * float(power.max(initial=0.1)))
-    axes.set_ylim(0.0, 105.0)
-    _set_up_axes(axes, "throttle and power", "airspeed (m/s)", "throttle (%)")
-    lines = [*axes.get_lines(), *power_axes.get_lines()]
-    axes.legend(lines, [line.get_label() for line in lines], loc="lower right")
 
 
 def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:

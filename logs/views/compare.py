@@ -3,10 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
+from flight.simulation.track import ROLL, THROTTLE, Track
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.views.charts import Chart, Layer, Panel, filled_series, make_leg_marks, series, shorten
@@ -57,7 +56,9 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     The panels are altitude, height above ground (omitted without terrain), airspeed, bank, cross-track error and
     throttle.
     """
-    distances = [_compute_distance_flown(flight.track) for flight in flights]
+    tracks = [flight.track for flight in flights]
+    steps = [np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T)) for track in tracks]
+    distances = [np.concatenate([[0.0], np.cumsum(track_steps)]) for track_steps in steps]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
     def make_flight_lines(values: list[Floats]) -> tuple[Layer, ...]:
@@ -67,17 +68,19 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
             for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)
         )
 
-    tracks = [flight.track for flight in flights]
+    heights = []
+    for flight in flights:
+        terrain, position = flight.setup.scenario.terrain, flight.track.position
+        ground: float | Floats = np.nan if terrain is None else terrain.height(position[:, 0], position[:, 1])
+        heights.append(np.asarray(position[:, 2] - ground))
     panels = (
         Panel("altitude", "m AMSL", make_flight_lines([track.position[:, 2] for track in tracks])),
-        Panel(
-            "height above ground", "m", make_flight_lines([_compute_height_above_ground(flight) for flight in flights])
-        ),
+        Panel("height above ground", "m", make_flight_lines(heights)),
         Panel("airspeed", "m/s", make_flight_lines([to_float64(track.airspeed) for track in tracks]), min_span=4.0),
         Panel(
             "bank, right +",
             "°",
-            make_flight_lines([np.degrees(to_float64(_get_roll_angle(track))) for track in tracks]),
+            make_flight_lines([np.degrees(to_float64(track.attitude[:, ROLL])) for track in tracks]),
         ),
         Panel(
             "cross-track, right +",
@@ -85,37 +88,11 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
             make_flight_lines([to_float64(track.cross_track) for track in tracks]),
             min_span=0.1,
         ),
-        Panel("throttle", "%", make_flight_lines([100.0 * to_float64(_get_throttle(track)) for track in tracks])),
+        Panel(
+            "throttle", "%", make_flight_lines([100.0 * to_float64(track.controls[:, THROTTLE]) for track in tracks])
+        ),
     )
     return Chart("Two flights along their paths", "distance flown over the ground", "km", panels)
-
-
-def _get_roll_angle(track: Track) -> NDArray[np.float32]:
-    """Return the roll angle of each row, rad."""
-    roll: NDArray[np.float32]
-    roll, _, _ = track.attitude.T
-    return roll
-
-
-def _get_throttle(track: Track) -> NDArray[np.float32]:
-    """Return the throttle of each row, 0 to 1."""
-    throttle: NDArray[np.float32]
-    _, _, _, throttle = track.controls.T
-    return throttle
-
-
-def _compute_distance_flown(track: Track) -> Floats:
-    """Return the distance flown over the ground up to each row, m."""
-    steps = np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T))
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def _compute_height_above_ground(flight: NamedFlight) -> Floats:
-    """Return the height above ground of each row, m; NaN without terrain."""
-    terrain, position = flight.setup.scenario.terrain, flight.track.position
-    if terrain is None:
-        return np.full(len(position), np.nan)
-    return np.asarray(position[:, 2] - terrain.height(position[:, 0], position[:, 1]))
 
 
 # An imported flight and the simulated flight of the same mission: one chart a quantity, over the distance.

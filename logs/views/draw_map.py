@@ -24,7 +24,6 @@ from logs.views.drawing import (
 )
 from logs.views.map import MapChart, NamedWind
 from logs.views.relief import relief
-from world.arrays import Floats
 from world.terrain import Terrain
 
 # Margin left of the map, inches.
@@ -129,29 +128,16 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
     axes.clabel(
         lines, levels[1::2], fmt="%.0f", fontsize=5.5, colors=theme.colour("contour"), inline_spacing=1, zorder=2.1
     )
-    _draw_colour_bar(figure, colours, norm, levels, column, top)
-    return [Line2D([], [], color=theme.colour("contour"), linewidth=0.8, label=f"contours every {step:g} m AMSL")]
-
-
-def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
-    """Draw the colour bar of the ground's altitude in the column right of the map.
-
-    colours, norm: matplotlib's colour map and normalisation of altitudes.
-    levels: altitudes of the contours, m AMSL; some of them label the bar.
-    column, top: left edge of the column, and distance of the bar from the figure's top, inches.
-    """
+    # The colour bar stands in the column right of the map; some of the contours label it.
     figure_height = float(figure.get_figheight())
     bar_height = min(2.6, figure_height - 3.4)
-    frame = (
-        column / WIDTH,
-        (figure_height - top - bar_height - 0.25) / figure_height,
-        0.16 / WIDTH,
-        bar_height / figure_height,
-    )
+    bar_bottom = (figure_height - top - bar_height - 0.25) / figure_height
+    frame = (column / WIDTH, bar_bottom, 0.16 / WIDTH, bar_height / figure_height)
     bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(frame))
     bar.set_ticks(levels[:: max(1, len(levels) // 8)].tolist())
     bar.set_label("ground elevation (m AMSL)", fontsize=8)
     bar.ax.tick_params(labelsize=7.5)
+    return [Line2D([], [], color=theme.colour("contour"), linewidth=0.8, label=f"contours every {step:g} m AMSL")]
 
 
 def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend_height: float = 0.0) -> None:
@@ -162,10 +148,16 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
     """
     figure_height = float(figure.get_figheight())
     dial_size = 1.0
-    notes = [
-        (_describe_wind(named_wind), theme.colour(named_wind.role) if len(winds) > 1 else theme.colour("ink"))
-        for named_wind in winds
-    ]
+    # Note on each wind, and its colour: flight, speed, direction and turbulence.
+    notes = []
+    for named_wind in winds:
+        wind = named_wind.wind
+        note = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
+        direction_text = f"from {round(np.degrees(wind.from_course)) % 360:03d}°"
+        note += f"wind {wind.speed:.1f} m/s\n{direction_text}" if wind.speed > 0.0 else "no mean wind"
+        note += "\n(mean of the forecast)" if wind.forecast is not None else ""
+        note += f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else ""
+        notes.append((note, theme.colour(named_wind.role if len(winds) > 1 else "ink")))
     lines = sum(text.count("\n") + 1 for text, _ in notes)
     dial_bottom = max(1.35, max(0.2, legend_height + 0.04) + _LINE * (lines + len(notes) - 1))
     dial = figure.add_axes(
@@ -192,16 +184,3 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
         style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7.5, "color": colour}
         figure.text((column + 0.4) / WIDTH, note_top / figure_height, text, **style)
         note_top -= _LINE * (text.count("\n") + 2)
-
-
-def _describe_wind(named_wind: NamedWind) -> str:
-    """Return the note below the compass on a wind: flight, speed, direction and turbulence."""
-    wind = named_wind.wind
-    text = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
-    if wind.speed > 0.0:
-        text += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
-    else:
-        text += "no mean wind"
-    if wind.forecast is not None:
-        text += "\n(mean of the forecast)"
-    return text + (f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else "")

@@ -246,8 +246,14 @@ def draw_chart(chart: Chart) -> Figure:
         for k, panel in enumerate(panels):
             row = 0 if chart.widths else k
             panel_bottom = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
-            left, width = _compute_panel_extent(chart, k, right_margin)
-            axes = figure.add_axes((left, panel_bottom / total_height, width, chart.print_height / total_height))
+            # Left edge and width of the panel, inches.
+            left, width = _LEFT, WIDTH - _LEFT - right_margin
+            if chart.widths:
+                width -= 0.75 * (len(chart.widths) - 1)
+                left += sum(chart.widths[:k]) * width + 0.75 * k
+                width *= chart.widths[k]
+            extent = (left / WIDTH, panel_bottom / total_height, width / WIDTH, chart.print_height / total_height)
+            axes = figure.add_axes(extent)
             _draw_panel(axes, chart, panel, has_leg_numbers=k == 0)
             if chart.legend == "beside" and not has_shared_legend:
                 handles, labels = axes.get_legend_handles_labels()
@@ -267,7 +273,23 @@ def draw_chart(chart: Chart) -> Figure:
         text_style: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
         figure.text(_LEFT / WIDTH, 1 - 0.3 / total_height, chart.title, **text_style)
         if has_shared_legend:
-            _add_legend_above(figure, 1 - 0.45 / total_height)
+            # One legend for all panels, in a row above them.
+            all_handles = {
+                str(label): handle
+                for axes in figure.axes
+                for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+                if label
+            }
+            figure.legend(
+                all_handles.values(),
+                all_handles.keys(),
+                loc="upper left",
+                bbox_to_anchor=(_LEFT / WIDTH - 0.01, 1 - 0.45 / total_height),
+                ncols=len(all_handles),
+                handlelength=2.2,
+                borderaxespad=0.0,
+                borderpad=0.2,
+            )
         if entries:
             draw_legend(
                 figure,
@@ -277,18 +299,6 @@ def draw_chart(chart: Chart) -> Figure:
                 columns,
             )
     return figure
-
-
-def _compute_panel_extent(chart: Chart, panel_number: int, right_margin: float) -> tuple[float, float]:
-    """Return the left edge and the width of a panel as fractions of the picture's width."""
-    total_width = WIDTH - _LEFT - right_margin
-    if not chart.widths:
-        return _LEFT / WIDTH, total_width / WIDTH
-    gap = 0.75 * (len(chart.widths) - 1)
-    width_before = sum(chart.widths[:panel_number])
-    return (_LEFT + width_before * (total_width - gap) + 0.75 * panel_number) / WIDTH, chart.widths[panel_number] * (
-        total_width - gap
-    ) / WIDTH
 
 
 def can_share_legend(panels: Sequence[Panel]) -> bool:
@@ -428,9 +438,29 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
         # Draw bands below the limits, and all other layers above them.
         is_background = layer.kind in ("band", "area") and layer.role != "terrain"
         zorder = min_zorder + (0.0 if is_background else 1.0) + 0.9 * k / len(panel.layers)
-        _DRAWERS[layer.kind](
-            axes, layer, theme.ROLE_STYLES[layer.role], zorder=zorder, label=layer.legend or layer.name or None
-        )
+        role_style = theme.ROLE_STYLES[layer.role]
+        options: dict[str, Any] = {"zorder": zorder, "label": layer.legend or layer.name or None}
+        match layer.kind:
+            case "line":
+                _draw_line(axes, layer, role_style, **options)
+            case "band":
+                _draw_band(axes, layer, role_style, **options)
+            case "area":
+                # The rings are one path, so that the holes of the area stay open.
+                points = np.column_stack([layer.x, layer.y])
+                gaps = np.flatnonzero(np.isnan(layer.x))
+                rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
+                shape = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
+                axes.add_patch(PathPatch(shape, **_make_area_style(role_style), **options))
+            case "bars":
+                axes.bar(layer.x, layer.y, width=0.62, color=role_style.light, **options)
+            case "dots":
+                axes.plot(layer.x, layer.y, **_make_dot_style(role_style, len(layer.x)), **options)
+            case "rings":
+                axes.plot(layer.x, layer.y, **_make_ring_style(role_style), **options)
+            case "dashes":
+                left, right = layer.x - 0.42, layer.x + 0.42
+                axes.hlines(layer.y, left, right, color=role_style.light, linewidth=2.0, **options)
 
 
 def _make_dash_pattern(role_style: theme.RoleStyle, dashed: bool = False) -> Any:
@@ -494,25 +524,6 @@ def _make_area_style(role_style: theme.RoleStyle) -> dict[str, Any]:
     }
 
 
-def _draw_area(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw the rings of an area as one path, so that the holes of the area stay open."""
-    points = np.column_stack([layer.x, layer.y])
-    gaps = np.flatnonzero(np.isnan(layer.x))
-    rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
-    shape = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
-    axes.add_patch(PathPatch(shape, **_make_area_style(role_style), **options))
-
-
-def _draw_bars(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as bars from zero."""
-    axes.bar(layer.x, layer.y, width=0.62, color=role_style.light, **options)
-
-
-def _draw_dots(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as markers."""
-    axes.plot(layer.x, layer.y, **_make_dot_style(role_style, len(layer.x)), **options)
-
-
 def _make_dot_style(role_style: theme.RoleStyle, count: int = 1) -> dict[str, Any]:
     """Return matplotlib's style options of markers; markers of medium size are smaller if there are many.
 
@@ -531,11 +542,6 @@ def _make_dot_style(role_style: theme.RoleStyle, count: int = 1) -> dict[str, An
     return style | {"mew": 0.0 if is_faint else 0.8, "alpha": role_style.fill if is_faint else 1.0}
 
 
-def _draw_rings(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as hollow circles."""
-    axes.plot(layer.x, layer.y, **_make_ring_style(role_style), **options)
-
-
 def _make_ring_style(role_style: theme.RoleStyle) -> dict[str, Any]:
     """Return matplotlib's style options of hollow circles."""
     return {
@@ -548,22 +554,6 @@ def _make_ring_style(role_style: theme.RoleStyle) -> dict[str, Any]:
         "color": role_style.light,
         "clip_on": False,
     }
-
-
-def _draw_dashes(axes: Any, layer: Layer, role_style: theme.RoleStyle, **options: Any) -> None:
-    """Draw a layer as short horizontal lines."""
-    axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=role_style.light, linewidth=2.0, **options)
-
-
-_DRAWERS: dict[str, Any] = {
-    "line": _draw_line,
-    "band": _draw_band,
-    "area": _draw_area,
-    "bars": _draw_bars,
-    "dots": _draw_dots,
-    "rings": _draw_rings,
-    "dashes": _draw_dashes,
-}
 
 
 # Names and legends.
@@ -638,26 +628,3 @@ def _choose_legend_columns(entries: Sequence[LegendEntry]) -> int:
         if sum(0.45 + 0.062 * width for width in column_widths) < WIDTH - 1.0:
             return columns
     return 1
-
-
-def _add_legend_above(figure: Figure, top: float) -> None:
-    """Draw one legend for all panels, in a row above them.
-
-    top: upper edge as a fraction of the height of the figure.
-    """
-    entries = {
-        str(label): handle
-        for axes in figure.axes
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        if label
-    }
-    figure.legend(
-        entries.values(),
-        entries.keys(),
-        loc="upper left",
-        bbox_to_anchor=(_LEFT / WIDTH - 0.01, top),
-        ncols=len(entries),
-        handlelength=2.2,
-        borderaxespad=0.0,
-        borderpad=0.2,
-    )

@@ -97,19 +97,6 @@ def _make_path_arguments(subject: Subject) -> dict[str, Any]:
     }
 
 
-def _make_map(subject: Subject) -> MapChart:
-    """Make the map of a flight."""
-    return flight_map(
-        subject.setup.scenario, **_make_path_arguments(subject), waypoint_texts=waypoint_names(subject.setup)
-    )
-
-
-def _make_scene(subject: Subject) -> SceneView:
-    """Make the 3-D view of a flight."""
-    waypoints = len(subject.setup.route.points)
-    return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
-
-
 def _make_flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
     """Make a function that builds a view of a flight, and returns None for a plan that was not flown."""
     return lambda subject: None if subject.track is None else make_chart(subject.setup, subject.track)
@@ -148,22 +135,9 @@ def _make_link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Call
     return lambda subject: None if subject.link is None else make_view(subject.setup, subject.link)
 
 
-def _write_link_caption(subject: Subject) -> str:
-    """Return the caption of the map of the radio link: the finding, and an explanation of the areas."""
-    findings = [finding for finding in subject.verdict.findings if finding.rule == "link"]
-    heading = "".join(_make_sentence(finding.reason) for finding in findings)
-    height_text = "" if subject.link is None else f" at {subject.link.coverage.height.text}"
-    return f"{heading}The areas show the link of an aircraft{height_text}, the median height of this flight."
-
-
 def _make_fixed_caption(text: str) -> Callable[[Subject], str]:
     """Make a caption function that returns the same text for every subject."""
     return lambda _: text
-
-
-def _name_autopilot(subject: Subject) -> str:
-    """Name the autopilot whose returns are drawn, as before "model" in a caption: "the ArduPlane"."""
-    return "the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}"
 
 
 def _make_sentence(line: str) -> str:
@@ -171,23 +145,24 @@ def _make_sentence(line: str) -> str:
     return f"{line[:1].upper()}{line[1:]}. "
 
 
-def _write_map_caption(subject: Subject) -> str:
-    """Return the caption of the map, which explains its lines."""
-    arc_text = " At corners the two differ: the aircraft flies an arc inside the waypoint."
-    flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
-        arc_text if subject.setup.imported_log is None else ""
-    )
-    return subject.text_if_flown(flight_text, "Nothing was flown: the line is the plan.")
-
-
 # In the page's order.
 FIGURES = (
     FigureEntry(
         "map",
         "Map",
-        _make_map,
+        lambda subject: flight_map(
+            subject.setup.scenario, **_make_path_arguments(subject), waypoint_texts=waypoint_names(subject.setup)
+        ),
         alternative=lambda subject: f"Map, north up: {subject.contents_text}",
-        caption=_write_map_caption,
+        caption=lambda subject: subject.text_if_flown(
+            "The broad line is the plan, and the thin line on it is the flight."
+            + (
+                " At corners the two differ: the aircraft flies an arc inside the waypoint."
+                if subject.setup.imported_log is None
+                else ""
+            ),
+            "Nothing was flown: the line is the plan.",
+        ),
         still=True,
     ),
     FigureEntry(
@@ -215,7 +190,9 @@ FIGURES = (
     FigureEntry(
         "scene",
         "3-D view",
-        _make_scene,
+        lambda subject: SceneView(
+            subject.setup, subject.track, failures(subject.verdict, len(subject.setup.route.points))
+        ),
         alternative=lambda subject: f"View from the side: {subject.contents_text}",
         caption=_make_fixed_caption(
             "Domes are the missiles' reach, dashed domes the radars' reach; thin poles join the "
@@ -253,8 +230,9 @@ FIGURES = (
         _make_returns_view("worst-returns"),
         alternative=_make_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=lambda subject: (
-            f"Simulated with {_name_autopilot(subject)} model on a point mass, in the mean wind, from the point"
-            " where each return begins."
+            "Simulated with "
+            + ("the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}")
+            + " model on a point mass, in the mean wind, from the point where each return begins."
         ),
     ),
     FigureEntry(
@@ -310,7 +288,12 @@ FIGURES = (
             "Map, north up: the path coloured by the margin of the radio link, the station, and the areas in which the "
             "link is weak or lost at the height of the flight."
         ),
-        caption=_write_link_caption,
+        caption=lambda subject: (
+            "".join(_make_sentence(finding.reason) for finding in subject.verdict.findings if finding.rule == "link")
+            + "The areas show the link of an aircraft"
+            + ("" if subject.link is None else f" at {subject.link.coverage.height.text}")
+            + ", the median height of this flight."
+        ),
     ),
     FigureEntry(
         "link",

@@ -9,7 +9,7 @@ import numpy as np
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Json, Label, Layer, Panel, numbers, panel_json, shorten
-from logs.views.failures import Failures, failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
+from logs.views.failures import failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
@@ -129,6 +129,7 @@ def map_chart(
     route = route_waypoints if route_waypoints is not None else plan_waypoints
     failed = failures(verdict, len(route) if route is not None else 0)
     stops = range(0 if route is None else len(route)) if stops is None else stops
+    stop_starts = stop_rows(stops)
     tracks = [drawn_track for drawn_track in tracks if len(drawn_track.track)]
     failing_threats = failed.threat_names()
     layers: list[Layer] = []
@@ -157,11 +158,24 @@ def map_chart(
             east, north = np.where(is_inside, drawn_track.track.position[:, :2].T, np.nan)
             layers += [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
     if route is not None:
-        layers += _make_waypoint_layers(route, stops, failed, waypoint_texts)
+        dot_role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
+        texts = tuple(waypoint_texts[k] for k in stop_starts) if waypoint_texts else ()
+        east, north, _ = route[stop_starts].T
+        layers.append(Layer("dots", "waypoint, numbered", dot_role, east, north, hover_texts=texts))
+        if failed.waypoints:
+            east, north, _ = route[list(failed.waypoints)].T
+            layers.append(Layer("rings", "waypoint that fails a rule", "fail", east, north, quiet=True))
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += make_fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, stops)
-    labels += [] if route is None else _make_waypoint_labels(route, stops, failed)
+    if route is not None:
+        # At most `_MAX_NUMBERS` waypoints are numbered, and all that fail a rule, except start and destination.
+        step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
+        numbered = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
+        labels += [
+            Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
+            for k in sorted(numbered - {0, len(route) - 1})
+        ]
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
     return scenario_map(
         scenario, subject, layers, labels, extent, route=route, failing_threats=frozenset(failing_threats), winds=winds
@@ -261,22 +275,6 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
     return (west, east), (south, north)
 
 
-def _make_waypoint_layers(
-    route: Floats, stops: Sequence[int], failed: Failures, texts_by_waypoint: Sequence[str]
-) -> list[Layer]:
-    """Make the layers of waypoints, and of waypoints that fail a rule."""
-    stop_starts = stop_rows(stops)
-    dot_role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
-    texts = tuple(texts_by_waypoint[k] for k in stop_starts) if texts_by_waypoint else ()
-    layers = [
-        Layer("dots", "waypoint, numbered", dot_role, route[stop_starts, 0], route[stop_starts, 1], hover_texts=texts)
-    ]
-    if failed.waypoints:
-        east, north = route[list(failed.waypoints), :2].T
-        layers.append(Layer("rings", "waypoint that fails a rule", "fail", east, north, quiet=True))
-    return layers
-
-
 def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
     """Return start and destination, each as its name and position; the scenario's if there is no route."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
@@ -301,20 +299,6 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
     if not are_close:
         return [start, destination]
     return [replace(start, text=f"{start.text}, {destination.text}")]
-
-
-def _make_waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
-    """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
-
-    Waypoints at start and destination are left out.
-    """
-    stop_starts = stop_rows(stops)
-    step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
-    numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
-    return [
-        Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
-        for k in sorted(numbered_waypoints - {0, len(route) - 1})
-    ]
 
 
 def position_text(lat_deg: float, lon_deg: float) -> str:

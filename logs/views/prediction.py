@@ -6,7 +6,6 @@ import numpy as np
 
 from aircraft.identification.blind import Band
 from logs.views.charts import Chart, Label, Layer, Panel
-from world.arrays import Floats
 
 # Largest step along the axis within one window, as a multiple of the median step.
 _MAX_STEP_RATIO = 5.0
@@ -30,7 +29,13 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
     for band in bands:
         if not np.isfinite(band.flown).any():
             continue
-        axis_values, low, high, flown_values = _with_gaps(factor * band.along, band.low, band.high, band.flown)
+        # NaN between the segments of a log, which end where the axis jumps, so that no line joins them.
+        axis_values = factor * band.along
+        steps = np.diff(axis_values)
+        jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1
+        axis_values, low, high, flown_values = (
+            np.insert(column, jumps, np.nan) for column in (axis_values, band.low, band.high, band.flown)
+        )
         layers = (
             Layer("band", "band of 95 %", "band", axis_values, high, low),
             Layer("line", "flown", "flown", axis_values, flown_values),
@@ -41,18 +46,3 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
         panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(inside_label,)))
     along_name, unit = ("time of the log", "s") if by_time else ("along the legs", "km")
     return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)
-
-
-def _with_gaps(axis_values: Floats, *columns: Floats) -> tuple[Floats, ...]:
-    """Insert NaN between the segments of a log, so that no line joins them.
-
-    A segment ends where the axis jumps.  Returns the axis, then the columns.
-
-    axis_values: position of each row along the axis, (n,).
-    columns: values of each row, (n,) each.
-    """
-    steps = np.diff(axis_values)
-    jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1
-    return axis_values if not len(jumps) else np.insert(axis_values, jumps, np.nan), *(
-        np.insert(column, jumps, np.nan) for column in columns
-    )

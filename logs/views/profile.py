@@ -82,19 +82,31 @@ def profile_chart(
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown_layers, entered_positions = _make_flown_layers(scenario, route, track, failed, plane)
     layers = [*zones, *cuts, *make_ground_bands(scenario, plane)]
-    layers += _mark_failing_legs(waypoint_distances, route, failed)
+    kilometres = waypoint_distances / 1000.0
+    layers += [
+        Layer("line", "leg that fails a rule", "failing-leg", kilometres[k : k + 2], route[k : k + 2, 2], quiet=True)
+        for k in failed.legs
+    ]
     layers += [] if is_straight_line else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
     layers += flown_layers
     labels: list[Label] = []
     if not is_straight_line:
         role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
-        positions = waypoint_distances[stop_starts] / 1000.0, route[stop_starts, 2]
+        positions = kilometres[stop_starts], route[stop_starts, 2]
         layers.append(Layer("dots", "waypoint, numbered", role, *positions, quiet=True))
         labels = _make_waypoint_labels(waypoint_distances, route, stops, failed)
-    layers += _mark_failing_waypoints(waypoint_distances, route, failed)
-    corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
+    if failed.waypoints:
+        rows = list(failed.waypoints)
+        layers.append(
+            Layer("rings", "waypoint that fails a rule", "fail", kilometres[rows], route[rows, 2], quiet=True)
+        )
+    corners = np.column_stack([kilometres, route[:, 2]])
     labels = [*make_fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_labels]
-    limits, note = _make_limit_lines(scenario, *altitude_span)
+    # A mission without a scenario has neither ceiling nor floor.
+    altitudes = () if scenario.external else (("ceiling", scenario.ceiling), ("floor", scenario.floor))
+    lines = [(f"{name}, {altitude:.0f} m AMSL", altitude) for name, altitude in altitudes]
+    limits = tuple(line for line in lines if altitude_span[0] < line[1] < altitude_span[1])
+    note = f"{lines[0][0]}, off the picture" if lines and lines[0] not in limits else ""
     panel = Panel("altitude", "m AMSL", tuple(layers), limits, span=altitude_span, note=note, labels=tuple(labels))
     return _make_chart(scenario, waypoint_distances, stop_starts, panel, is_straight=is_straight_line)
 
@@ -236,33 +248,6 @@ def _make_flown_layers(
     ], label_positions
 
 
-def _mark_failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
-    """Return layers that mark the legs that fail a rule."""
-    return [
-        Layer(
-            "line",
-            "leg that fails a rule",
-            "failing-leg",
-            waypoint_distances[k : k + 2] / 1000.0,
-            route[k : k + 2, 2],
-            quiet=True,
-        )
-        for k in failed.legs
-    ]
-
-
-def _mark_failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
-    """Return the layer that marks the waypoints that fail a rule, if any."""
-    if not failed.waypoints:
-        return []
-    rows = list(failed.waypoints)
-    return [
-        Layer(
-            "rings", "waypoint that fails a rule", "fail", waypoint_distances[rows] / 1000.0, route[rows, 2], quiet=True
-        )
-    ]
-
-
 def _make_waypoint_labels(
     waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures
 ) -> list[Label]:
@@ -276,18 +261,3 @@ def _make_waypoint_labels(
         Label(str(stops[k]), float(waypoint_distances[k]) / 1000.0, float(route[k, 2]), "number", "waypoint")
         for k in sorted(numbered_waypoints)
     ]
-
-
-def _make_limit_lines(
-    scenario: Scenario, min_altitude: float, max_altitude: float
-) -> tuple[tuple[tuple[str, float], ...], str]:
-    """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture.
-
-    A mission without a scenario has neither.
-    """
-    if scenario.external:
-        return (), ""
-    ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"
-    limits = tuple((name, value) for name, value in ((ceiling, scenario.ceiling), (floor, scenario.floor)))
-    note = "" if min_altitude < scenario.ceiling < max_altitude else f"{ceiling}, off the picture"
-    return tuple((name, value) for name, value in limits if min_altitude < value < max_altitude), note

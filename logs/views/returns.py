@@ -7,8 +7,8 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn, group_segments
-from logs.verdict.returns.judge_glides import Glide, Glides, Reach
+from logs.verdict.returns.drawn_returns import DrawnReturns, group_segments
+from logs.verdict.returns.judge_glides import Glide, Reach
 from logs.verdict.returns.judge_returns import KINDS, Kind, SimulatedReturn
 from logs.verdict.returns.return_starts import planned_positions
 from logs.verdict.returns.returns_text import outcome_text, segment_text
@@ -17,7 +17,6 @@ from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario
 from logs.views.profile import make_ground_bands, terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
 from world.arrays import Floats
-from world.scenario import Scenario
 
 # Role and name of the path by outcome of the returns; the safe outcome is drawn lowest.
 _ROLES_AND_NAMES: dict[Kind, tuple[str, str]] = {
@@ -69,7 +68,16 @@ def split_judged_path(
     times = np.array([time_of(element) for element in elements])
     # The first and the last element stand for the path beyond them, too, as far as the others do.
     margin = 0.5 * float(np.diff(times).max(initial=0.0))
-    path_times, positions = _sample_path(setup, track, float(times[0]) - margin, float(times[-1]) + margin)
+    first, last = float(times[0]) - margin, float(times[-1]) + margin
+    if track is None:
+        path_times, positions = planned_positions(setup, max(_MIN_STEP_S, (last - first) / _PATH_POINTS))
+        is_shown = (path_times >= first) & (path_times <= last)
+        path_times, positions = path_times[is_shown], positions[is_shown]
+    else:
+        is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
+        rows = np.flatnonzero(is_shown)
+        rows = rows[:: max(1, len(rows) // _PATH_POINTS)]
+        path_times, positions = track.time[rows], track.position[rows]
     nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), path_times)
     points = [PathPoint(float(path_times[k]), positions[k], elements[nearest[k]]) for k in range(len(path_times))]
     return group_segments(points, lambda point: key_of(point.element))
@@ -191,49 +199,43 @@ def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Char
     if not drawn_returns.worst:
         return None
     scenario = setup.scenario
-    spans = [_find_altitude_span(scenario, worst) for worst in drawn_returns.worst]
+    # All panels show the same range of altitudes, which contains each path and the ground under it with a margin, m.
+    spans = []
+    for worst in drawn_returns.worst:
+        ground = terrain_altitudes(scenario, worst.path)
+        altitudes = np.concatenate([worst.path[:, 2], np.zeros(0) if ground is None else ground])
+        min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
+        margin = 0.1 * max(max_altitude - min_altitude, _MIN_SPAN)
+        spans.append((min_altitude - margin, max_altitude + margin))
     span = (min(bottom for bottom, _ in spans), max(top for _, top in spans))
-    panels = tuple(
-        _make_profile_panel(scenario, worst, number, span) for number, worst in enumerate(drawn_returns.worst, 1)
-    )
+    panels = []
+    for number, worst in enumerate(drawn_returns.worst, 1):
+        path = worst.path
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
+        plane = PathPlane(along, path, terrain_altitudes(scenario, path), *span)
+        zones, zone_labels = zone_bands(scenario.zones, plane)
+        cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
+        layers = [*zones, *cuts, *make_ground_bands(scenario, plane)]
+        layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
+        if not worst.simulated.safe:
+            nearest_row = int(np.argmin(np.linalg.norm(path - worst.marked_position, axis=1)))
+            layers.append(
+                Layer("rings", "where it fails", "fail", along[[nearest_row]], worst.marked_position[[2]], quiet=True)
+            )
+        title = f"{number}: from {worst.simulated.time:.0f} s"
+        note = segment_text(worst.simulated.kind).removeprefix("a return ")
+        labels = (*cut_names, *zone_labels)
+        panels.append(Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=labels))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
         "distance since it turned back",
         "km",
-        panels,
+        tuple(panels),
         page_height=240,
         print_height=2.3,
         legend="below",
         scaled=True,
     )
-
-
-def _find_altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
-    """Return the lowest and highest altitude of a return's path and the ground under it, with a margin, m."""
-    ground = terrain_altitudes(scenario, worst.path)
-    altitudes = np.concatenate([worst.path[:, 2], np.zeros(0) if ground is None else ground])
-    min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
-    margin = 0.1 * max(max_altitude - min_altitude, _MIN_SPAN)
-    return min_altitude - margin, max_altitude + margin
-
-
-def _make_profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
-    """Return the profile of one of the worst returns, with ground, zones and spheres."""
-    path = worst.path
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
-    plane = PathPlane(along, path, terrain_altitudes(scenario, path), *span)
-    zones, zone_labels = zone_bands(scenario.zones, plane)
-    cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
-    layers = [*zones, *cuts, *make_ground_bands(scenario, plane)]
-    layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
-    if not worst.simulated.safe:
-        nearest_row = int(np.argmin(np.linalg.norm(path - worst.marked_position, axis=1)))
-        layers.append(
-            Layer("rings", "where it fails", "fail", along[[nearest_row]], worst.marked_position[[2]], quiet=True)
-        )
-    title = f"{number}: from {worst.simulated.time:.0f} s"
-    note = segment_text(worst.simulated.kind).removeprefix("a return ")
-    return Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_labels))
 
 
 # ----------------------------------------------------------------------
@@ -269,8 +271,29 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
         Layer("line", name, "limit", safe_altitudes.time, safe_altitudes.altitude),
     ]
     panels = [Panel("altitude", "m AMSL", tuple(layers), span=span)]
-    if drawn_returns.glides.each:
-        panels.append(_make_glide_margin_panel(drawn_returns.glides))
+    glides = drawn_returns.glides
+    if glides.each:
+        # Altitude to spare of glides without the engine, by destination.  The wider line is below, so that both are
+        # seen where they coincide.
+        home_margins = [glide.home_altitude_left for glide in glides.each]
+        flat_margins = [glide.flat_altitude_left for glide in glides.each]
+        home_name = "to spare for home"
+        lines = []
+        if len(glides.sites) > 1:
+            site_margins = [glide.site_altitude_left for glide in glides.each]
+            if np.array_equal(site_margins, home_margins, equal_nan=True):
+                home_name = "to spare for home, and for a rally point or landing place there"
+            else:
+                lines.append(("to spare for a rally point or landing place", "left-site", site_margins))
+        lines += [(home_name, "left-home", home_margins), ("to spare for flat ground", "left-flat", flat_margins)]
+        glide_times = np.array([glide.time for glide in glides.each])
+        margin_layers = tuple(
+            series(line_name, role, glide_times, np.where(np.isfinite(margins), margins, np.nan))
+            for line_name, role, margins in lines
+        )
+        limits = (("nothing to spare", 0.0),)
+        title = "altitude to spare without the engine"
+        panels.append(Panel(title, "m", margin_layers, limits, min_span=_MIN_SPAN))
     return Chart(
         f"{shorten(scenario.name, 60)}: return to launch, or engine failure",
         "time since the start",
@@ -281,44 +304,3 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
         print_height=2.8,
         legend="below",
     )
-
-
-def _sample_path(setup: FlightSetup, track: Track | None, first: float, last: float) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), of the flown or planned path between two times (s).
-
-    track: the flown track, whose rows are thinned; None for the planned path.
-    """
-    if track is None:
-        times, positions = planned_positions(setup, max(_MIN_STEP_S, (last - first) / _PATH_POINTS))
-        is_shown = (times >= first) & (times <= last)
-        return times[is_shown], positions[is_shown]
-    is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
-    rows = np.flatnonzero(is_shown)
-    rows = rows[:: max(1, len(rows) // _PATH_POINTS)]
-    return track.time[rows], track.position[rows]
-
-
-def _make_glide_margin_panel(glides: Glides) -> Panel:
-    """Make a panel with the altitude to spare of glides without engine over time, by destination."""
-    time = np.array([glide.time for glide in glides.each])
-
-    def make_line(name: str, role: str, values: list[float]) -> Layer:
-        """Make a line over time, with gaps at values that are not finite."""
-        column = np.array(values)
-        return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
-
-    # The wider line is below, so that both are seen where they coincide.
-    home_margins, home_name, layers = [glide.home_altitude_left for glide in glides.each], "to spare for home", []
-    if len(glides.sites) > 1:
-        site_margins = [glide.site_altitude_left for glide in glides.each]
-        site_name = "to spare for a rally point or landing place"
-        if np.array_equal(site_margins, home_margins, equal_nan=True):
-            home_name = "to spare for home, and for a rally point or landing place there"
-        else:
-            layers.append(make_line(site_name, "left-site", site_margins))
-    layers.append(make_line(home_name, "left-home", home_margins))
-    layers.append(
-        make_line("to spare for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each])
-    )
-    limits = (("nothing to spare", 0.0),)
-    return Panel("altitude to spare without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

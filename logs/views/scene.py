@@ -111,11 +111,37 @@ def scene_data(view: SceneView) -> dict[str, object]:
     bounds = scene_bounds(setup, view.track)
     grid = ground_grid(setup.scenario.terrain, bounds, MAX_GROUND)
     threats, stops = setup.scenario.threats, setup.route.stops.tolist()
+    ground: dict[str, object] | None = None
+    if grid is not None:
+        min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
+        fraction = (grid.heights - min_height) / max(max_height - min_height, 1e-6)
+        codes = np.where(np.isfinite(fraction), np.round(fraction * (MISSING - 1)), MISSING).astype("<u2")
+        ground = {
+            "columns": len(grid.east),
+            "rows": len(grid.north),
+            "low": min_height,
+            "high": max_height,
+            "heights": base64.b64encode(codes.tobytes()).decode("ascii"),
+        }
+    # Rings with floor and ceiling at each corner.
+    altitudes = setup.route.positions[:, 2]
+    min_altitude, max_altitude = float(altitudes.min()), float(altitudes.max()) + 50.0
+    zones = [
+        {
+            "name": zone.name,
+            "keep_out": zone.kind == "exclusion",
+            "rings": [
+                np.round(ring, 1).tolist()
+                for ring in zone_walls(zone, setup.scenario.terrain, min_altitude, max_altitude)
+            ],
+        }
+        for zone in setup.scenario.zones
+    ]
     return {
         "name": setup.scenario.name,
         "bounds": np.round(bounds, 1).tolist(),
         "stretch": exaggeration(setup, bounds, grid),
-        "ground": None if grid is None else _encode_ground(grid),
+        "ground": ground,
         "threats": [
             {
                 "name": name,
@@ -125,46 +151,8 @@ def scene_data(view: SceneView) -> dict[str, object]:
             }
             for k, name in enumerate(threats.names)
         ],
-        **_make_zone_walls(setup),
+        **({"zones": zones} if zones else {}),
         "plan": np.round(setup.display_waypoints, 1).tolist(),
         "numbers": [[k, stops[k]] for k in stop_rows(stops)],
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
-    }
-
-
-def _make_zone_walls(setup: FlightSetup) -> dict[str, object]:
-    """Return the zones as JSON data: name, kind, and rings with floor and ceiling at each corner.
-
-    The result is empty without zones.
-    """
-    zones, altitudes = setup.scenario.zones, setup.route.positions[:, 2]
-    if not zones:
-        return {}
-    walls = [
-        zone_walls(zone, setup.scenario.terrain, float(altitudes.min()), float(altitudes.max()) + 50.0)
-        for zone in zones
-    ]
-    return {
-        "zones": [
-            {
-                "name": zone.name,
-                "keep_out": zone.kind == "exclusion",
-                "rings": [np.round(ring, 1).tolist() for ring in rings],
-            }
-            for zone, rings in zip(zones, walls, strict=True)
-        ]
-    }
-
-
-def _encode_ground(grid: GroundGrid) -> dict[str, object]:
-    """Return the ground as JSON data, with altitudes as 16-bit fractions of their range in base64."""
-    min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
-    fraction = (grid.heights - min_height) / max(max_height - min_height, 1e-6)
-    codes = np.where(np.isfinite(fraction), np.round(fraction * (MISSING - 1)), MISSING).astype("<u2")
-    return {
-        "columns": len(grid.east),
-        "rows": len(grid.north),
-        "low": min_height,
-        "high": max_height,
-        "heights": base64.b64encode(codes.tobytes()).decode("ascii"),
     }

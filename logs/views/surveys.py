@@ -76,6 +76,7 @@ def _make_survey_panel(
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, line_measures, strict=True), 1):
         corners = to_line_axes(requirements.points[line.first : line.last + 1])
+        distances = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
         unknown_spans = () if measure is None else measure.unknown_spans
         # A line that was not flown is lost as a whole.
         lost_spans = ((0.0, np.inf),) if measure is None else measure.lost_spans
@@ -90,8 +91,11 @@ def _make_survey_panel(
             (unknown_parts, unknown_spans),
             (usable_parts, usable_spans),
         ):
-            for span_start, span_end in spans:
-                parts.append(_cut_line(corners, span_start, span_end))
+            for start, end in spans:
+                # The part of the line between two distances along it, m.
+                is_inside = (distances > start) & (distances < end)
+                cuts = np.concatenate([[start], distances[is_inside], [min(end, distances[-1])]])
+                parts.append(np.stack([np.interp(cuts, distances, corners[:, axis]) for axis in range(2)], axis=1))
         if (number - 1) % step == 0:
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     track_points = to_line_axes(position[:: max(1, len(position) // _POINTS)])
@@ -104,12 +108,3 @@ def _make_survey_panel(
         layers = (*layers, Layer("line", "outside the terrain data, not judged", "return-unknown", *unknown_line))
     layers = (*layers, Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True))
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
-
-
-def _cut_line(corners: Floats, start: float, end: float) -> Floats:
-    """Return the part of a line (n, 2) between two distances along it, m."""
-    distances = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-    cut_distances = np.concatenate(
-        [[start], distances[(distances > start) & (distances < end)], [min(end, distances[-1])]]
-    )
-    return np.stack([np.interp(cut_distances, distances, corners[:, axis]) for axis in range(2)], axis=1)

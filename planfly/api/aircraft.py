@@ -190,7 +190,16 @@ def describe_aircraft(
         cruise, steps = level_flight_modes(aircraft_entry, aircraft_entry.airspeed), step_responses(aircraft_entry)
     files: tuple[Path, ...] = ()
     if folder is not None:
-        pictures = _draw_pictures(aircraft_entry, envelope, trims, modes, steps)
+        # Imported here: only pictures need matplotlib.
+        from logs.views.aircraft import draw_envelope, draw_step_responses, draw_trims
+        from logs.views.drawing import png_bytes
+
+        with stage("drawing", "drawing an aircraft"):
+            pictures = {
+                "envelope.png": png_bytes(draw_envelope(aircraft_entry, envelope)),
+                "trims.png": png_bytes(draw_trims(aircraft_entry, trims, modes)),
+                "steps.png": png_bytes(draw_step_responses(aircraft_entry, steps)),
+            }
         prepare_folder(folder, tuple(pictures))
         for file, data in pictures.items():
             write_atomically(folder / file, data)
@@ -210,28 +219,3 @@ def _load_aircraft(name: str | Path) -> Aircraft:
         message = f"{text}: no such folder; planfly aircraft --new {shlex.quote(text)} makes it"
         raise PlanflyError(message, file=text)
     return find_aircraft(absolute_path(Path(text)))
-
-
-def _draw_pictures(
-    aircraft: Aircraft,
-    envelope: Envelope,
-    trims: tuple[TrimRow, ...],
-    modes: Mapping[float, tuple[Mode, ...]],
-    steps: tuple[StepResponse, ...],
-) -> dict[str, bytes]:
-    """Draw the pictures of an aircraft, and return them as PNG by file name.
-
-    trims: trimmed level flight at each airspeed.
-    modes: modes of motion, keyed by airspeed, m/s.
-    steps: responses to steps of the controls.
-    """
-    # Imported here: only pictures need matplotlib.
-    from logs.views.aircraft import draw_envelope, draw_step_responses, draw_trims
-    from logs.views.drawing import png_bytes
-
-    with stage("drawing", "drawing an aircraft"):
-        return {
-            "envelope.png": png_bytes(draw_envelope(aircraft, envelope)),
-            "trims.png": png_bytes(draw_trims(aircraft, trims, modes)),
-            "steps.png": png_bytes(draw_step_responses(aircraft, steps)),
-        }

@@ -66,6 +66,7 @@ def ground_risk(
     if out is not None:
         check_output_folder(Path(out), overwrite)
     base = open_sample(target, options)
+    population = None if population is None else Path(population)
     goal = GroundRiskGoal(
         probability=probability,
         flights=options["flights"],
@@ -73,26 +74,22 @@ def ground_risk(
         glide=glide,
         speed=max_speed,
         controlled=controlled,
-        population=None if population is None else Path(population),
+        population=population,
         unit=population_unit,
     )
     with stage("flying", "flying for the ground risk") as advance:
         result = find_ground_risk(base, goal, workers_used, advance)
-    command = answer_command_line("ground-risk", target, base, options, _list_goal_options(goal))
-    return result if out is None else _write_files(result, Path(out), command, overwrite=overwrite)
-
-
-def _list_goal_options(goal: GroundRiskGoal) -> dict[str, object]:
-    """Return the command-line options that reproduce a goal: value of each option, by name."""
-    return {
-        "population": goal.population,
-        "population_unit": None if goal.population is None else goal.unit,
-        "controlled": goal.controlled,
-        "max_speed": goal.speed,
-        "probability": goal.probability,
-        "glide": goal.glide,
-        "every": goal.interval,
+    goal_options = {
+        "population": population,
+        "population_unit": None if population is None else population_unit,
+        "controlled": controlled,
+        "max_speed": max_speed,
+        "probability": probability,
+        "glide": glide,
+        "every": every,
     }
+    command = answer_command_line("ground-risk", target, base, options, goal_options)
+    return result if out is None else _write_files(result, Path(out), command, overwrite=overwrite)
 
 
 def _write_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:

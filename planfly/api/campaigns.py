@@ -223,13 +223,6 @@ def continued_goal(
     )
 
 
-def _report_flight_count(goal: Goal, folder: Path) -> None:
-    """Report the number of flights of a resumed campaign if the user stated none, and where it is from."""
-    stored_count = read_stored_settings(folder / CAMPAIGN_DATABASE).get("flights")
-    origin = "as in the resumed campaign" if goal.flights == stored_count else "the default"
-    report_line(f"number of flights: {'at most ' if goal.stops else ''}{goal.flights:,}, {origin}")
-
-
 def _warn_of_too_few_flights(goal: Goal) -> None:
     """Warn if a campaign has too few flights to show its target, even if all of them are flyable."""
     estimator, best = Estimator(goal), Tally(goal.flights, 0)
@@ -285,44 +278,25 @@ def campaign(
         if resume:
             goal = continued_goal(directory.folder, *requested)
             if options["flights"] is None:
-                _report_flight_count(goal, directory.folder)
+                stored_count = read_stored_settings(directory.folder / CAMPAIGN_DATABASE).get("flights")
+                origin = "as in the resumed campaign" if goal.flights == stored_count else "the default"
+                report_line(f"number of flights: {'at most ' if goal.stops else ''}{goal.flights:,}, {origin}")
         _warn_of_too_few_flights(goal)
         options = _with_stored_options(options, directory)
         base = _open_base(target, options, _read_spread(options["spread"]), directory)
         stated = _list_command_line_options(base, options, options["spread"], directory.folder)
         repeated = campaign_command_line(_name_command_line_target(target, directory.folder), goal, stated)
-        return _fly_and_summarise(base, goal, workers_used, directory, stated, repeated, keep=out is not None)
-
-
-def _fly_and_summarise(
-    base: CampaignBase,
-    goal: Goal,
-    workers: Workers,
-    directory: OutputDirectory,
-    options: Mapping[str, object],
-    command: str,
-    *,
-    keep: bool,
-) -> CampaignResult:
-    """Fly the flights that a campaign's table lacks, and summarise the campaign.
-
-    goal: what the campaign has to prove, and its number of flights.
-    directory: folder with the table.
-    options: options of the flights, which are stored for a resumption.
-    command: command line that repeats the campaign, for its report.
-    keep: True to write summary, report and logs into the folder; False for a temporary folder.
-    """
-    table_path = directory.folder / CAMPAIGN_DATABASE
-    with open_store(base, goal, directory.folder, resume=directory.resume, options=options) as store:
-        with stage("flying", "flying a campaign") as advance:
-            estimate = fly_campaign(base, goal, workers, store, advance)
-        short_summary = None if keep else summarise_campaign(base, goal, estimate, store)
-    # The open store locks its table.
-    if short_summary is not None:
-        return CampaignResult(short_summary, read_table(table_path))
-    with stage("reporting") as advance:
-        summary = finish_campaign(base, goal, estimate, directory.folder, command, advance)
-    return CampaignResult(summary, read_table(table_path), table_path)
+        table_path = directory.folder / CAMPAIGN_DATABASE
+        with open_store(base, goal, directory.folder, resume=directory.resume, options=stated) as store:
+            with stage("flying", "flying a campaign") as advance:
+                estimate = fly_campaign(base, goal, workers_used, store, advance)
+            short_summary = summarise_campaign(base, goal, estimate, store) if out is None else None
+        # The open store locks its table.
+        if short_summary is not None:
+            return CampaignResult(short_summary, read_table(table_path))
+        with stage("reporting") as advance:
+            summary = finish_campaign(base, goal, estimate, directory.folder, repeated, advance)
+        return CampaignResult(summary, read_table(table_path), table_path)
 
 
 @requires_extra("campaigns")
@@ -345,23 +319,14 @@ def campaign_flight(
     directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)
     options = _with_stored_options(options, directory)
     base = _open_base(target, options, _read_spread(options["spread"]), directory)
-    row = _read_flight_row(base, goal, folder, index)
-    log = folder / "flights" / f"flight-{index:06d}.mcap"
-    log.parent.mkdir(exist_ok=True)
-    return CampaignFlight(fly_row_again(base, row, log), log)
-
-
-def _read_flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
-    """Read a flight from a campaign's table.
-
-    Raises PlanflyError if the table has no flight with this index.
-    """
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
             allowed = f"no such flight: the campaign has {count_text(store.tally().flown, 'flight')}, numbered from 0"
             raise PlanflyError.of_argument("index", index, allowed, file=store.path)
-    return row
+    log = folder / "flights" / f"flight-{index:06d}.mcap"
+    log.parent.mkdir(exist_ok=True)
+    return CampaignFlight(fly_row_again(base, row, log), log)
 
 
 @requires_extra("campaigns")
@@ -536,14 +501,6 @@ def battery(
         "confidence": options["confidence"],
     }
     command = answer_command_line("battery", target, base, options, search_options)
-    return _write_battery_files(result, Path(out), command, overwrite=overwrite)
-
-
-def _write_battery_files(result: BatteryResult, folder: Path, command: str, *, overwrite: bool) -> BatteryResult:
-    """Write chart and page of a result into a folder, and return the result with the files.
-
-    command: command line that repeats the search; "" if there is none.
-    """
     # Imported here: only pictures need matplotlib.
     from logs.views.drawing import png_bytes
     from planfly.campaigns.answer_pages import battery_page
@@ -552,4 +509,4 @@ def _write_battery_files(result: BatteryResult, folder: Path, command: str, *, o
     with stage("drawing", "drawing the battery"):
         figure = draw_battery(result)
         contents = {"battery.png": png_bytes(figure), "report.html": battery_page(result, figure, command).render()}
-    return replace(result, files=replace_files(folder, contents, overwrite=overwrite))
+    return replace(result, files=replace_files(Path(out), contents, overwrite=overwrite))

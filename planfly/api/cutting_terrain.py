@@ -59,7 +59,24 @@ def terrain(
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: expected a name that ends with .tif", file=target)
     check_output_file(target, overwrite, Path(around) if around is not None else None)
-    area = _add_margin_to_box(_parse_box(box) if box is not None else _find_mission_box(Path(str(around))), margin)
+    if box is not None:
+        try:
+            south, west, north, east = (float(value) for value in box)
+        except (TypeError, ValueError):
+            south = west = north = east = math.nan
+        # An area may lie across the 180th meridian, from 179 to -179 or to 181.
+        unwrapped_east = east + 360.0 if east < west else east
+        # NaN must fail these comparisons.
+        is_valid_lat = -_MAX_LATITUDE_DEG <= south < north <= _MAX_LATITUDE_DEG
+        if not (is_valid_lat and -180.0 <= west <= 180.0 and west < unwrapped_east <= west + 30.0):
+            allowed = "expected south, west, north, east, degrees -84..84 and -180..180, south below north"
+            raise ArgumentError.of_argument("box", box, allowed)
+        inner = Box(south, west, north, unwrapped_east)
+    else:
+        inner = _find_mission_box(Path(str(around)))
+    lat_margin = margin / _DEGREE_KM
+    lon_margin = lat_margin / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(inner.south), abs(inner.north)))))
+    area = Box(inner.south - lat_margin, inner.west - lon_margin, inner.north + lat_margin, inner.east + lon_margin)
     source_name = str(source)
     with stage("fetching terrain" if "://" in source_name else "cutting terrain") as advance:
         if "://" not in source_name:
@@ -69,28 +86,15 @@ def terrain(
             allowed = "expected a folder, or an http or https address without a query"
             raise ArgumentError.of_argument("source", source_name, allowed, shown=ascii(source_name))
         with tempfile.TemporaryDirectory() as fallback:
-            return cut_from_server(source_name, area, target, _find_cache_folder(Path(fallback)), advance, sea=sea)
-
-
-def _parse_box(edges: Sequence[float]) -> Box:
-    """Convert the edges of an area to a box.  Raises ArgumentError for invalid edges.
-
-    edges: south, west, north and east edge, degrees.
-    """
-    try:
-        south, west, north, east = (float(value) for value in edges)
-    except (TypeError, ValueError):
-        south = west = north = east = math.nan
-    # NaN must fail these comparisons.  An area may lie across the 180th meridian, from 179 to -179 or to 181.
-    unwrapped_east = east + 360.0 if east < west else east
-    if not (
-        -_MAX_LATITUDE_DEG <= south < north <= _MAX_LATITUDE_DEG
-        and -180.0 <= west <= 180.0
-        and west < unwrapped_east <= west + 30.0
-    ):
-        allowed = "expected south, west, north, east, degrees -84..84 and -180..180, south below north"
-        raise ArgumentError.of_argument("box", edges, allowed)
-    return Box(south, west, north, unwrapped_east)
+            cache = Path(user_cache_dir("planfly")) / "terrain"
+            try:
+                cache.mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=cache):
+                    pass
+            except OSError:
+                # The user's cache cannot be written.
+                cache = Path(fallback)
+            return cut_from_server(source_name, area, target, cache, advance, sea=sea)
 
 
 def _find_mission_box(file: Path) -> Box:
@@ -116,21 +120,3 @@ def _find_mission_box(file: Path) -> Box:
             file=file,
         )
     return Box(min(lats), min(lons), max(lats), max(lons))
-
-
-def _add_margin_to_box(box: Box, margin: float) -> Box:
-    """Return a box with a margin (km) added to every side."""
-    lat_margin = margin / _DEGREE_KM
-    lon_margin = lat_margin / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
-    return Box(box.south - lat_margin, box.west - lon_margin, box.north + lat_margin, box.east + lon_margin)
-
-
-def _find_cache_folder(fallback: Path) -> Path:
-    """Return the cache folder of downloaded parts, or `fallback` if the user's cache cannot be written."""
-    folder = Path(user_cache_dir("planfly")) / "terrain"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        return fallback

@@ -54,7 +54,16 @@ def new_scenario(
     endpoints = GeoPosition(*parse_position("start", start)), GeoPosition(*parse_position("destination", destination))
     target = Path(folder)
     name = Path(absolute_path(target)).name if ".." in target.parts else target.absolute().name
-    file = _check_scenario_file(target, name, overwrite=overwrite)
+    if not name.isprintable() or not 1 <= len(name) <= 100:
+        allowed = "expected a folder with a name of 1 to 100 printable characters"
+        raise PlanflyError.of_argument("folder", target, allowed, shown=ascii(str(target)))
+    if target.suffix == ".toml" or (target.exists() and not target.is_dir()):
+        raise PlanflyError(f"{target}: expected the name of a folder, in which to write the scenario", file=target)
+    file = target / f"{name}.toml"
+    if target.is_dir():
+        check_output_file(file, overwrite)
+    elif not target.absolute().parent.is_dir():
+        raise PlanflyError(f"{target}: its parent folder '{target.parent}' does not exist", file=target)
     autopilot_name, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
     raster_path = None if terrain is None else _make_absolute_path(terrain, is_name=terrain in EMBEDDED)
     model_path = _make_absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
@@ -81,24 +90,6 @@ def new_scenario(
     )
     target.mkdir(exist_ok=True)
     write_atomically(file, draft_text(relative_draft))
-    return file
-
-
-def _check_scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """Return the path of the new scenario file, NAME.toml in the folder.
-
-    Raises PlanflyError for an invalid folder, and for an existing file without `overwrite`.
-    """
-    if not name.isprintable() or not 1 <= len(name) <= 100:
-        allowed = "expected a folder with a name of 1 to 100 printable characters"
-        raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
-    if folder.suffix == ".toml" or (folder.exists() and not folder.is_dir()):
-        raise PlanflyError(f"{folder}: expected the name of a folder, in which to write the scenario", file=folder)
-    file = folder / f"{name}.toml"
-    if folder.is_dir():
-        check_output_file(file, overwrite)
-    elif not folder.absolute().parent.is_dir():
-        raise PlanflyError(f"{folder}: its parent folder '{folder.parent}' does not exist", file=folder)
     return file
 
 

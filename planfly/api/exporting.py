@@ -1,6 +1,7 @@
 """Export a plan, a mission or a flight log in the formats that the suffixes of the files name."""
 
 import contextlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -151,10 +152,21 @@ def export(
     targets = tuple(Path(file) for file in files)
     chosen_autopilot = _find_chosen_autopilot(autopilot, params)
     with contextlib.ExitStack() as temporary_folders:
-        path = _find_source_path(source, temporary_folders)
+        if isinstance(source, Plan):
+            path = temporary_folders.enter_context(temporary_folder("planfly-export-")) / PLAN_FILE
+            write_atomically(path, plan_json(source))
+        elif isinstance(source, FlownMission):
+            if source.log is None:
+                raise PlanflyError("export: the flight has no log; fly(..., log=FILE) writes one", field="source")
+            path = source.log
+        else:
+            path = Path(source.source if isinstance(source, FlightLog) else source)
         for target in targets:
-            if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
-                _check_suffix(target)
+            suffixes = (*KINDS, *MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES)
+            if target.suffix.lower() not in suffixes:
+                allowed = f"expected one of {', '.join(suffixes)}"
+                message = f"{target}: suffix {target.suffix!r}: {allowed}"
+                raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed)
             check_output_file(target, overwrite, path)
         options = MissionOptions(
             fence=fence, at=at, scenario=scenario, autopilot=autopilot, params=params, aircraft=aircraft
@@ -246,37 +258,6 @@ def _with_missing_ends_note(
     return replace(source, notes=(*source.notes, missing_ends)) if missing_ends else source
 
 
-def _find_source_path(
-    source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack
-) -> Path:
-    """Return the path of a source's file.
-
-    A plan is written to a file that exists while `temporary_folders` is open.  Raises PlanflyError for a flight without
-    a log.
-    """
-    if isinstance(source, Plan):
-        file = temporary_folders.enter_context(temporary_folder("planfly-export-")) / PLAN_FILE
-        write_atomically(file, plan_json(source))
-        return file
-    if isinstance(source, FlightLog):
-        return Path(source.source)
-    if isinstance(source, FlownMission):
-        if source.log is None:
-            raise PlanflyError("export: the flight has no log; fly(..., log=FILE) writes one", field="source")
-        return source.log
-    return Path(source)
-
-
-def _check_suffix(target: Path) -> None:
-    """Raise MissionError if the suffix of a file is not the suffix of a mission file."""
-    try:
-        mission_kind(target)
-    except MissionError:
-        allowed = f"expected one of {', '.join([*KINDS, *MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES])}"
-        message = f"{target}: suffix {target.suffix!r}: {allowed}"
-        raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
-
-
 def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _SourceContent:
     """Read those parts of a log, a plan or a mission that the target files need.
 
@@ -294,7 +275,19 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
                 word = "parameters" if name == "params" else name
                 allowed = f"not allowed: a log is exported with the {word} of its flight"
                 raise MissionError.of_argument(name, value, allowed, file=path)
-        return _read_log(path, needs_returns=_needs_kml(targets))
+        log = read_log(path)
+        setup = log.setup
+        lines = {"plan": plan_line(setup)}
+        if len(log.track):
+            lines["flown"] = track_line(setup, log.track)
+        source = _SourceContent(
+            *(setup.mission, setup.scenario.name, lines, map_zones(setup)),
+            log=log,
+            autopilot=setup.autopilot,
+            airspeed=setup.airspeed,
+            aircraft=Path(setup.aircraft).name,
+        )
+        return _with_returns(source, setup, log.track) if _needs_kml(targets) else source
     has_aircraft = options.get("aircraft") is not None
     if not has_aircraft and not any(target.suffix.lower() in PARAMETER_SUFFIXES for target in targets):
         # Only the parameters of a .parm file need the autopilot itself; a .plan states its name.
@@ -329,26 +322,6 @@ def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | Non
     )
 
 
-def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
-    """Read a flight log.
-
-    needs_returns: True to add returns from a few points of the flight.
-    """
-    log = read_log(path)
-    lines = {"plan": plan_line(log.setup)}
-    if len(log.track):
-        lines["flown"] = track_line(log.setup, log.track)
-    setup = log.setup
-    source = _SourceContent(
-        *(setup.mission, setup.scenario.name, lines, map_zones(setup)),
-        log=log,
-        autopilot=setup.autopilot,
-        airspeed=setup.airspeed,
-        aircraft=Path(setup.aircraft).name,
-    )
-    return _with_returns(source, log.setup, log.track) if needs_returns else source
-
-
 def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _SourceContent:
     """Read the parts of a plan or a mission file that the target files need.
 
@@ -376,17 +349,13 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
         aircraft=Path(setup.aircraft).name,
     )
     source = _with_returns(source, setup, track=None) if needs_returns else source
-    if not is_plan:
-        return _with_zones(source, setup.scenario)
-    mission, notes = add_plan_fence(setup)
+    if is_plan:
+        mission, notes = add_plan_fence(setup)
+    else:
+        fence_items, zone_notes = zone_fences(setup.scenario.zones, setup.scenario.origin)
+        mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
+        notes = tuple(zone_notes)
     return replace(source, mission=mission, fence_notes=notes)
-
-
-def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
-    """Add a scenario's zones as fences to a source's mission, and note zones that a fence cannot state."""
-    fence_items, notes = zone_fences(scenario.zones, scenario.origin)
-    mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
-    return replace(source, mission=mission, fence_notes=tuple(notes))
 
 
 def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
@@ -397,7 +366,20 @@ def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | by
     """
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in LOG_SUFFIXES and source.log is not None:
-        return _encode_flight(source.log, suffix)
+        description = f"{count_text(len(source.log.track), 'row')}, {source.log.end_time:.0f} s"
+        if suffix == ".tlog":
+            require_extra("live", ".tlog needs")
+            from logs.views.exports.telemetry_file import telemetry_bytes
+
+            return telemetry_bytes(source.log), description
+        from logs.views.exports.log_files import csv_text, parquet_bytes, px4_log_bytes
+
+        writers: Mapping[str, Callable[[FlightLog], str | bytes]] = {
+            ".csv": csv_text,
+            ".parquet": parquet_bytes,
+            ".ulg": px4_log_bytes,
+        }
+        return writers[suffix](source.log), description
     if suffix in MAP_WRITERS:
         descriptions = [*source.lines, *([count_text(len(source.zones), "zone")] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
@@ -419,23 +401,16 @@ def _make_target_content(source: _SourceContent, target: Path) -> tuple[str | by
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {count_text(len(mission.fences), 'fence item')}, {count_text(len(mission.rally), 'rally point')}"
     if kind == "plan":
-        airspeed, origin = _find_cruise_speed(source)
+        if (mission_speed := stated_cruise_speed(mission)) is not None:
+            airspeed, origin = mission_speed, "from the mission"
+        elif source.airspeed is not None:
+            airspeed, origin = source.airspeed, f"from {source.aircraft}"
+        else:
+            aircraft = load_aircraft(FlightTable().aircraft)
+            airspeed = aircraft.airspeed
+            origin = f"from the default aircraft {aircraft.name}; name yours with --aircraft"
         mission, extra = replace(mission, cruise_speed=airspeed), f"{extra}, cruiseSpeed {airspeed:.0f} m/s {origin}"
     return mission_text(mission, kind), f"{count_text(len(mission.items), 'item')}{extra}"
-
-
-def _find_cruise_speed(source: _SourceContent) -> tuple[float, str]:
-    """Return the cruiseSpeed of a .plan, m/s, and a text on where it comes from.
-
-    It is the mission's cruise speed, or else the airspeed at which planfly flies the mission.  Without a scenario or a
-    plan, this is the cruise airspeed of the default aircraft.
-    """
-    if (mission_speed := stated_cruise_speed(source.mission)) is not None:
-        return mission_speed, "from the mission"
-    if source.airspeed is not None:
-        return source.airspeed, f"from {source.aircraft}"
-    aircraft = load_aircraft(FlightTable().aircraft)
-    return aircraft.airspeed, f"from the default aircraft {aircraft.name}; name yours with --aircraft"
 
 
 def format_judging_parameters(
@@ -465,20 +440,3 @@ def format_judging_parameters(
         else "by planfly's defaults for this mission; name your own parameter file with export ... --params FILE"
     )
     return parameters_text(values, title), f"{count_text(len(values), 'parameter')} of {autopilot.title}{omitted}"
-
-
-def _encode_flight(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """Return a flight in the log format with this suffix, and a description of the content."""
-    description = f"{count_text(len(log.track), 'row')}, {log.end_time:.0f} s"
-    if suffix == ".tlog":
-        require_extra("live", ".tlog needs")
-        from logs.views.exports.telemetry_file import telemetry_bytes
-
-        return telemetry_bytes(log), description
-    if suffix == ".ulg":
-        from logs.views.exports.log_files import px4_log_bytes
-
-        return px4_log_bytes(log), description
-    from logs.views.exports.log_files import csv_text, parquet_bytes
-
-    return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), description

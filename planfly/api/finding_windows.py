@@ -94,7 +94,17 @@ def window(
         result = find_window(base, goal, workers, advance)
     search_options = {"from": earliest, "to": latest, "every": every, "probability": probability}
     command = answer_command_line("window", target, base, options, search_options)
-    return result if out is None else _write_files(result, Path(out), command, overwrite=overwrite)
+    if out is None:
+        return result
+    # Imported here: only pictures need matplotlib.
+    from logs.views.drawing import png_bytes
+    from planfly.campaigns.answer_pages import window_page
+    from planfly.campaigns.window_chart import draw_window
+
+    with stage("drawing", "drawing the departures"):
+        figure = draw_window(result)
+        contents = {"window.png": png_bytes(figure), "report.html": window_page(result, figure, command).render()}
+    return replace(result, files=replace_files(Path(out), contents, overwrite=overwrite))
 
 
 def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Sequence[datetime]) -> CampaignBase:
@@ -118,22 +128,6 @@ def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Se
             raise ArgumentError.of_argument("forecast", None, allowed, shown="")
         return base
     raise errors[0]
-
-
-def _write_files(result: WindowResult, folder: Path, command: str, *, overwrite: bool) -> WindowResult:
-    """Write chart and page of a result into a folder, and return the result with the files.
-
-    command: command line that repeats the search; "" if there is none.
-    """
-    # Imported here: only pictures need matplotlib.
-    from logs.views.drawing import png_bytes
-    from planfly.campaigns.answer_pages import window_page
-    from planfly.campaigns.window_chart import draw_window
-
-    with stage("drawing", "drawing the departures"):
-        figure = draw_window(result)
-        contents = {"window.png": png_bytes(figure), "report.html": window_page(result, figure, command).render()}
-    return replace(result, files=replace_files(folder, contents, overwrite=overwrite))
 
 
 def _parse_step(every: str) -> timedelta:

@@ -23,7 +23,6 @@ from planfly.flight_options import (
     FlyOptions,
     LogOptions,
     MissionOptions,
-    NamedFences,
     load_scenario_with_options,
     read_named_fences,
     select_log_options,
@@ -169,7 +168,19 @@ def fly(
     limits = FlightLimits(options["max_hours"], options["max_log"])
     program = None if options["sitl"] is None else check_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
-    target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
+    target = None if log is None else expand_path_pattern(log, setup.name, setup.seed)
+    if target is not None:
+        source = None if isinstance(mission, Plan) else Path(mission)
+        folder_must_exist = log is not None and target == Path(log)
+        check_output_file(target, overwrite, source, suffix=".mcap", folder_must_exist=folder_must_exist)
+        program_logs = [] if program is None else [autopilot_log_path(target, program)]
+        for program_log in program_logs:
+            check_output_file(program_log, overwrite, source, folder_must_exist=folder_must_exist)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if log == FLY_LOG:
+            # Remove the report and the pictures of the previous flight.
+            prepare_folder(target.parent, LOG_FIGURES)
+        report_replaced(target, *program_logs)
     with flying_stage(setup) as advance:
         return fly_and_judge(
             setup,
@@ -215,31 +226,6 @@ def fly_by_each(
     return flights
 
 
-def _prepare_log_file(
-    log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
-) -> Path:
-    """Return the file of a flight's log, after making its folder and removing an existing log.
-
-    The log of the autopilot program is removed, too.
-
-    log: the file as the user named it, in which {name} and {seed} are replaced.
-    Raises PlanflyError for a file that cannot be written, and for an existing file without `overwrite`.
-    """
-    target = expand_path_pattern(log, setup.name, setup.seed)
-    source = None if isinstance(mission, Plan) else Path(mission)
-    folder_must_exist = target == Path(log)
-    check_output_file(target, overwrite, source, suffix=".mcap", folder_must_exist=folder_must_exist)
-    if program is not None:
-        program_log = autopilot_log_path(target, program)
-        check_output_file(program_log, overwrite, source, folder_must_exist=folder_must_exist)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if log == FLY_LOG:
-        # Remove the report and the pictures of the previous flight.
-        prepare_folder(target.parent, LOG_FIGURES)
-    report_replaced(target, *((autopilot_log_path(target, program),) if program is not None else ()))
-    return target
-
-
 # ----------------------------------------------------------------------
 # Judge a flight log or a mission.
 
@@ -279,7 +265,18 @@ def judge(
             source, {"geometry": geometry or None}, "allowed only with a mission; a log is judged by its flight"
         )
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
-        return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
+        setup, fences = what.setup, read_named_fences(options["fence"])
+        if (terrain := options["terrain"]) is not None:
+            setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
+        if fences.items or fences.zones or fences.rally:
+            setup = setup.in_scenario(fences.add_to_scenario(setup.scenario))
+            setup = replace(setup, mission=fences.add_to_mission(setup.mission))
+        if isinstance(what, FlightLog):
+            verdict = judge_log(replace(what, setup=setup))
+            return Judged(setup, verdict, loss_text(what), not what.complete, what.track, is_log=True)
+        # A flown mission without another terrain or fences keeps its verdict.
+        verdict = what.verdict if setup is what.setup else judge_flight(setup, what.track, what.ended)
+        return Judged(setup, verdict, track=what.track, is_log=True)
     flight_options = select_mission_options(options)
     if not geometry:
         flight = fly(what, **flight_options)
@@ -345,26 +342,6 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
         source, {name: value for name, value in options.items() if name not in allowed_options}, _FIXED_OPTIONS_TEXT
     )
     check_keywords_not_given(source, {"scenario": options["scenario"]}, _FIXED_SCENARIO_TEXT)
-
-
-def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
-    """Judge a recorded flight again; a flown mission without another terrain or fences keeps its verdict.
-
-    terrain: elevation file that replaces the terrain of the flight; None keeps the terrain.
-    fences: additional fences.
-    """
-    setup = flight.setup
-    if terrain is not None:
-        setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
-    if fences.items or fences.zones or fences.rally:
-        setup = replace(
-            setup.in_scenario(fences.add_to_scenario(setup.scenario)), mission=fences.add_to_mission(setup.mission)
-        )
-    if isinstance(flight, FlightLog):
-        verdict = judge_log(replace(flight, setup=setup))
-        return Judged(setup, verdict, loss_text(flight), not flight.complete, flight.track, is_log=True)
-    verdict = flight.verdict if setup is flight.setup else judge_flight(setup, flight.track, flight.ended)
-    return Judged(setup, verdict, track=flight.track, is_log=True)
 
 
 def check_program(sitl: str | Path) -> Path:

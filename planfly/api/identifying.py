@@ -127,7 +127,11 @@ def identify_aircraft(
     stated_numbers = {"mass": mass, "span": span, **({} if area is None else {"area": area})}
     _check_stated_numbers(stated_numbers, prior)
     stated_numbers.setdefault("area", prior.wing_area * (span / prior.wing_span) ** 2)
-    volts, energy = _find_battery(prior, battery)
+    if battery is None:
+        volts, energy = prior.battery_voltage, prior.battery_energy
+    else:
+        sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
+        volts, energy = sheet.volts, sheet.energy
     base_numbers = scale_base_model(base_model(prior), **stated_numbers, volts=volts)
     check_base(prior)
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}", "reading logs"):
@@ -143,7 +147,10 @@ def identify_aircraft(
     with stage("estimating"):
         has_fast_rows = all(find_slowest_log_rate(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
-        check_estimate(estimate, base_numbers, _find_unmixed_outputs(log, prior), log.source)
+        # Logs of PX4 and tables of columns contain the controls themselves, not servo outputs.
+        has_outputs = log.program_kind not in ("px4", "columns")
+        servo_outputs = log_outputs(log, prior).items() if has_outputs else ()
+        check_estimate(estimate, base_numbers, {name: servo.output for name, servo in servo_outputs}, log.source)
         check_power(estimate, records, base_numbers)
         identified = make_identification(prior, base_numbers, estimate, motion_logs, outputs, until)
         files = make_folder_files(identified, target.name, (volts, energy))
@@ -172,18 +179,6 @@ def _make_result(
         wide=_find_wide_numbers(identified),
         conflict=identified.power_conflict(),
     )
-
-
-def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
-    """Return voltage (V) and energy (J) of the battery.
-
-    prior: base aircraft, whose battery is used if `battery` is None.
-    battery: volts and capacity, such as "44.4V,888Wh".
-    """
-    if battery is None:
-        return prior.battery_voltage, prior.battery_energy
-    sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
-    return sheet.volts, sheet.energy
 
 
 def _load_base(base: str | Path) -> Aircraft:
@@ -265,16 +260,6 @@ def read_records_and_outputs(
     )
     used_outputs = dict(base_outputs) if is_same else outputs
     return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
-
-
-def _find_unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
-    """Return the output number of each control that has its own servo output in the log.
-
-    Logs of PX4 and tables of columns have none: they contain the controls themselves, not servo outputs.
-    """
-    if log.program_kind in ("px4", "columns"):
-        return {}
-    return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
 def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:

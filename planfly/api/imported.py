@@ -82,7 +82,18 @@ def import_log(
         check_output_file(Path(target), overwrite, Path(log))
     flight = read_imported(log, **options)
     if target is not None:
-        _write_log(Path(target), flight)
+        path = Path(target)
+        # The log is written completely or not at all.
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+            new_file = Path(folder) / path.name
+            with Recorder(new_file, flight.setup) as recorder:
+                # Write the events first, so that each event is at its time in the log.
+                for event in flight.events:
+                    recorder.event(event.time, event.text, event.level)
+                for start in range(0, len(flight.track), _ROWS_PER_WRITE):
+                    recorder.write(flight.track.rows(start, start + _ROWS_PER_WRITE))
+                recorder.finish(flight.ended, flight.verdict)
+            new_file.replace(path)
     return flight
 
 
@@ -126,20 +137,6 @@ def guess_columns(
     return ColumnGuesses(target, sum("# guess" in line for line in lines), missing)
 
 
-def _write_log(target: Path, flight: ImportedFlight) -> None:
-    """Write an imported flight as a flight log, completely or not at all."""
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        path = Path(folder) / target.name
-        with Recorder(path, flight.setup) as recorder:
-            # Write the events first, so that each event is at its time in the log.
-            for event in flight.events:
-                recorder.event(event.time, event.text, event.level)
-            for start in range(0, len(flight.track), _ROWS_PER_WRITE):
-                recorder.write(flight.track.rows(start, start + _ROWS_PER_WRITE))
-            recorder.finish(flight.ended, flight.verdict)
-        path.replace(target)
-
-
 # ----------------------------------------------------------------------
 # Fly the mission of an imported flight again in JSBSim, and compare model and flight.
 
@@ -180,43 +177,22 @@ def refly(
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)
         with stage("drawing", "drawing a flight again"):
+            # Imported here: only pictures need matplotlib.
+            from logs.views.compare import refly_charts
+            from logs.views.drawing import draw_chart, png_bytes
+
             for number, reflight in enumerate(reflights, 1):
                 ending = "" if number == 1 else f"-{number}"
-                files += [
-                    *_draw_charts(folder, reflight, ending),
-                    _record_simulation(folder, reflight, flight_log, ending),
-                ]
+                for name, chart in refly_charts(reflight).items():
+                    files.append((folder / name).with_stem(f"{Path(name).stem}{ending}"))
+                    write_atomically(files[-1], png_bytes(draw_chart(chart)))
+                # The simulated flight as a flight log, for `compare` and `replay`.
+                files.append(folder / f"simulated{ending}.mcap")
+                verdict = judge_flight(reflight.setup, reflight.simulated, reflight.ended)
+                with Recorder(files[-1], replace(reflight.setup, seed=flight_log.setup.seed)) as recorder:
+                    recorder.write(reflight.simulated)
+                    recorder.finish(reflight.ended, verdict)
     return Reflown(reflights, tuple(lines), tuple(files))
-
-
-def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
-    """Draw the charts that compare a logged with a simulated flight as PNG files, and return the files.
-
-    ending: text added to the stem of each file name.
-    """
-    # Imported here: only pictures need matplotlib.
-    from logs.views.compare import refly_charts
-    from logs.views.drawing import draw_chart, png_bytes
-
-    files = []
-    for name, chart in refly_charts(reflight).items():
-        path = (folder / name).with_stem(f"{Path(name).stem}{ending}")
-        write_atomically(path, png_bytes(draw_chart(chart)))
-        files.append(path)
-    return files
-
-
-def _record_simulation(folder: Path, reflight: Reflight, log: FlightLog, ending: str) -> Path:
-    """Write the simulated flight as a flight log, for `compare` and `replay`, and return the file.
-
-    ending: text added to the stem of the file name.
-    """
-    path = folder / f"simulated{ending}.mcap"
-    verdict = judge_flight(reflight.setup, reflight.simulated, reflight.ended)
-    with Recorder(path, replace(reflight.setup, seed=log.setup.seed)) as recorder:
-        recorder.write(reflight.simulated)
-        recorder.finish(reflight.ended, verdict)
-    return path
 
 
 # ----------------------------------------------------------------------

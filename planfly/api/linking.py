@@ -7,7 +7,6 @@ from typing import NamedTuple, Unpack
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
 from logs.verdict.findings import Finding
 from logs.verdict.measures.link_outages import LinkAlongPath
@@ -170,23 +169,26 @@ def link(
     entries = {_ENTRIES[name]: value for name, value in link_options.items()}
     scenario = with_link(judged_flight.setup.scenario, **entries, lat_deg=lat, lon_deg=lon)
     setup = judged_flight.setup.in_scenario(with_ground_at_station(scenario, judged_flight.setup.mission))
-    result = _judge_link(setup, judged_flight.track)
-    return result if out is None else _write_pictures(result, Path(out), overwrite=overwrite)
-
-
-def _write_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
-    """Write the pictures and the coverage of a link into a folder, and return the result with their files.
-
-    The result is returned unchanged if the link was not computed along a path.
-    """
-    if result.along is None or result.antenna is None:
+    scenario_link, track = setup.scenario.link, judged_flight.track
+    if scenario_link is None:
+        raise ValueError("the scenario has no link")
+    # As in the verdict.  If the track, the terrain or the position of the station is missing, the finding is undecided.
+    with stage("computing the radio link"):
+        requirements, aligned = route_requirements(setup), None
+        if track is not None and len(track) and setup.imported_log is None:
+            requirements, aligned = flown_phases(requirements, track)
+        elif track is not None and len(track):
+            aligned = align_track(requirements, track)
+        judged_link = judge_link(requirements, aligned, scenario_link, fly_again=fly_return)
+    where = "" if judged_link.leg is None else place_text(judged_link.leg)
+    result = LinkResult(setup, judged_link.finding, judged_link.along, judged_link.antenna, where, judged_link.returns)
+    if out is None or result.along is None or result.antenna is None:
         return result
     # Imported here: only pictures need matplotlib.
     from logs.views.exports.coverage_file import coverage_geotiff
     from logs.views.figures import View, draw_pictures
     from logs.views.link import compute_link, link_chart, link_map
 
-    setup = result.setup
     with stage("drawing", "drawing a link"):
         drawn = compute_link(setup, result.along, result.antenna, is_flown=True)
         if drawn is None:
@@ -194,26 +196,4 @@ def _write_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Lin
         views: dict[str, View] = {"link": link_chart(setup, drawn), "link-map": link_map(setup, drawn)}
         files = draw_pictures(views)
         files["link-coverage.tif"] = coverage_geotiff(drawn.coverage, setup.scenario.origin)
-    return replace(result, files=replace_files(folder, files, overwrite=overwrite))
-
-
-def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
-    """Judge the radio link of a scenario along a track, as the verdict does.
-
-    If the track, the terrain or the position of the station is missing, the finding is undecided, and the result has no
-    link along the path.
-    """
-    link_of_scenario = setup.scenario.link
-    if link_of_scenario is None:
-        raise ValueError("the scenario has no link")
-    with stage("computing the radio link"):
-        requirements, aligned = route_requirements(setup), None
-        if track is not None and len(track):
-            requirements, aligned = (
-                flown_phases(requirements, track)
-                if setup.imported_log is None
-                else (requirements, align_track(requirements, track))
-            )
-        judged_link = judge_link(requirements, aligned, link_of_scenario, fly_again=fly_return)
-    where = "" if judged_link.leg is None else place_text(judged_link.leg)
-    return LinkResult(setup, judged_link.finding, judged_link.along, judged_link.antenna, where, judged_link.returns)
+    return replace(result, files=replace_files(Path(out), files, overwrite=overwrite))

@@ -13,7 +13,7 @@ from planner.search.algorithms import find_algorithm
 from world.argument_types import checks_types
 from world.errors import ArgumentError
 from world.scenario import Scenario, scenario_from_spec
-from world.scenario_tables import OWN_GUIDANCE, FlightTable
+from world.scenario_tables import OWN_GUIDANCE
 
 # Tables of a position, which replace another position as a whole.
 _POSITIONS = ("start", "destination", "home")
@@ -56,11 +56,24 @@ def make_scenario(
     >>> scenario.threats.kill_scale.tolist(), scenario.wind.speed
     ([15.0, 15.0], 4.0)
     """
-    _check_terrain(tables.get("terrain"))
+    given_terrain = tables.get("terrain")
+    given_path = given_terrain.get("path") if isinstance(given_terrain, Mapping) else None
+    for name, value in (("terrain", given_terrain), ("terrain.path", given_path)):
+        if isinstance(value, np.ndarray):
+            allowed = (
+                'expected {"kind": "dem", "path": FILE}; an array of heights (m, rows from north to south) with edges'
+                ' (degrees) is written to FILE by np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=, ymax=)'
+                " (docs/your-dem.md)"
+            )
+            raise ArgumentError.of_argument(name, value, allowed, shown=f"array of shape {value.shape}")
     base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
     if isinstance(flight := tables.get("flight"), Mapping):
-        spec["flight"] = _without_other_autopilot(spec["flight"], base_scenario.flight, flight)
+        autopilot = flight.get("autopilot") or (OWN_GUIDANCE if flight.get("guidance") else None)
+        if autopilot not in (None, base_scenario.flight.steering.autopilot):
+            # Remove the base's autopilot; the default accuracy of the navigation depends on it.
+            dropped_keys = (*_AUTOPILOT_KEYS, *(("nav",) if base_scenario.flight.nav is None else ()))
+            spec["flight"] = {key: value for key, value in spec["flight"].items() if key not in dropped_keys}
     for name, values in _convert_to_plain_values(tables).items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         if is_merged and any(key in values and values[key] != spec[name].get(key) for key in _SOURCE_KEYS):
@@ -83,21 +96,6 @@ def make_scenario(
     return scenario
 
 
-def _check_terrain(table: Any) -> None:
-    """Raise ArgumentError if [terrain] or its file is an array, and say how to write a file from it."""
-    for name, value in (
-        ("terrain", table),
-        ("terrain.path", table.get("path") if isinstance(table, Mapping) else None),
-    ):
-        if isinstance(value, np.ndarray):
-            allowed = (
-                'expected {"kind": "dem", "path": FILE}; an array of heights (m, rows from north to south) with edges'
-                ' (degrees) is written to FILE by np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=, ymax=)'
-                " (docs/your-dem.md)"
-            )
-            raise ArgumentError.of_argument(name, value, allowed, shown=f"array of shape {value.shape}")
-
-
 def _convert_to_plain_values(values: Any) -> Any:
     """Convert numpy arrays and numbers in tables to lists and numbers of Python."""
     if isinstance(values, Mapping):
@@ -105,16 +103,3 @@ def _convert_to_plain_values(values: Any) -> Any:
     if isinstance(values, list | tuple):
         return [_convert_to_plain_values(value) for value in values]
     return values.tolist() if isinstance(values, np.ndarray | np.generic) else values
-
-
-def _without_other_autopilot(entries: dict[str, Any], base: FlightTable, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Remove the base's autopilot from the entries of [flight] if the changes name another autopilot.
-
-    entries: entries of the base with its defaults, such as the release of the autopilot.
-    """
-    autopilot = changes.get("autopilot") or (OWN_GUIDANCE if changes.get("guidance") else None)
-    if autopilot in (None, base.steering.autopilot):
-        return entries
-    # The default accuracy of the navigation depends on the autopilot.
-    dropped_keys = (*_AUTOPILOT_KEYS, *(("nav",) if base.nav is None else ()))
-    return {key: value for key, value in entries.items() if key not in dropped_keys}

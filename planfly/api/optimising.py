@@ -133,20 +133,13 @@ class Optimiser:
             self._levels = (Level(tuple(range(constraints)), (0.0,) * constraints), *levels) if constraints else levels
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(points)
-        self._update_front(points, scores)
-        self._search.tell(scores)
-        self._is_asked = False
-
-    def _update_front(self, points: Floats, scores: Floats) -> None:
-        """Merge points into the front, which keeps only non-dominated points, sorted by the first objective.
-
-        points: evaluated points, (n, d).
-        scores: violations and then values of these points, (n, v + m).
-        """
+        # The front keeps only non-dominated points, sorted by the first objective.
         all_points, all_scores = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         front = np.flatnonzero(ranks(all_scores, self._levels) == 0)
         order = front[np.argsort(all_scores[front, self._violation_count], kind="stable")][: self._max_points]
         self._points, self._scores = all_points[order], all_scores[order]
+        self._search.tell(scores)
+        self._is_asked = False
 
     @property
     def best(self) -> BestFound:
@@ -247,17 +240,6 @@ def optimise(
     1.08
     """
     check_arguments(population=population, seed=None if isinstance(seed, np.random.Generator) else seed)
-    lower_bounds, upper_bounds = _parse_bounds(lower, upper)
-    if not isinstance(model, str) or model not in _MODELS:
-        raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
-    if population % 2:
-        raise ArgumentError.of_argument("population", population, RANGES["population"].expected)
-    first_points = None if initial is None else _parse_initial(initial, population, lower_bounds, upper_bounds)
-    return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
-
-
-def _parse_bounds(lower: ArrayLike, upper: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the bounds of a box as arrays (d,).  Raises ArgumentError for other shapes or bounds without a width."""
     lower_bounds, upper_bounds = _parse_numbers("lower", lower), _parse_numbers("upper", upper)
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
         shapes = f"of shapes {lower_bounds.shape} and {upper_bounds.shape}"
@@ -267,24 +249,22 @@ def _parse_bounds(lower: ArrayLike, upper: ArrayLike) -> tuple[Floats, Floats]:
     if not (np.isfinite(widths) & (widths > 0.0)).all():
         allowed = "expected finite numbers, lower below upper by a finite difference"
         raise ArgumentError.of_argument("lower, upper", lower, allowed, shown="")
-    return lower_bounds, upper_bounds
-
-
-def _parse_initial(initial: ArrayLike, population: int, lower: Floats, upper: Floats) -> Floats:
-    """Return the first points as an array (population, d).
-
-    Raises ArgumentError for another shape, and for points outside the box.
-    """
-    points, expected_shape = _parse_numbers("initial", initial), (population, lower.size)
-    if points.shape != expected_shape or not np.isfinite(points).all():
-        allowed = f"expected finite numbers of shape {expected_shape}"
-        raise ArgumentError.of_argument("initial", initial, allowed, shown=f"of shape {points.shape}")
-    is_inside = ((points >= lower) & (points <= upper)).all(axis=1)
-    if not is_inside.all():
-        row = int(np.argmin(is_inside))
-        place = f"row {row}: {points[row].tolist()}"
-        raise ArgumentError.of_argument("initial", initial, "outside the box of lower and upper", shown=place)
-    return points
+    if not isinstance(model, str) or model not in _MODELS:
+        raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
+    if population % 2:
+        raise ArgumentError.of_argument("population", population, RANGES["population"].expected)
+    first_points = None if initial is None else _parse_numbers("initial", initial)
+    if first_points is not None:
+        expected_shape = (population, lower_bounds.size)
+        if first_points.shape != expected_shape or not np.isfinite(first_points).all():
+            allowed = f"expected finite numbers of shape {expected_shape}"
+            raise ArgumentError.of_argument("initial", initial, allowed, shown=f"of shape {first_points.shape}")
+        is_inside = ((first_points >= lower_bounds) & (first_points <= upper_bounds)).all(axis=1)
+        if not is_inside.all():
+            row = int(np.argmin(is_inside))
+            place = f"row {row}: {first_points[row].tolist()}"
+            raise ArgumentError.of_argument("initial", initial, "outside the box of lower and upper", shown=place)
+    return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
 
 
 def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:

@@ -108,7 +108,15 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
                 name, value, "cannot be combined with waypoints, because nothing is then searched"
             )
     expected = "expected an array (w, 3) of at least 2 rows: east, north and altitude AMSL, m"
-    coordinates = _select_coordinate_columns(waypoints)
+    coordinates: Any = waypoints
+    names = list(getattr(waypoints, "columns", ()))
+    if any(isinstance(name, str) for name in names):
+        # A data frame; the order of other names is unknown.
+        known_names = next((known for known in _COLUMN_NAMES if set(known) <= set(names)), None)
+        if known_names is None:
+            allowed = "expected columns east_m, north_m and amsl_m"
+            raise ArgumentError.of_argument("waypoints", names, allowed, shown=f"columns {', '.join(map(str, names))}")
+        coordinates = coordinates[list(known_names)]
     try:
         path = np.array(coordinates, dtype=np.float64)
     except (TypeError, ValueError):
@@ -130,21 +138,6 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
 
 # Names of the coordinates in the columns of a data frame of waypoints.
 _COLUMN_NAMES = (("east_m", "north_m", "amsl_m"), ("east", "north", "amsl"), ("east_m", "north_m", "up_amsl_m"))
-
-
-def _select_coordinate_columns(waypoints: Any) -> Any:
-    """Return the columns east, north and altitude of a data frame of waypoints, in this order.
-
-    Anything without named columns is returned unchanged.  Raises ArgumentError for other names, whose order is unknown.
-    """
-    names = list(getattr(waypoints, "columns", ()))
-    if not any(isinstance(name, str) for name in names):
-        return waypoints
-    for known in _COLUMN_NAMES:
-        if set(known) <= set(names):
-            return waypoints[list(known)]
-    allowed = "expected columns east_m, north_m and amsl_m"
-    raise ArgumentError.of_argument("waypoints", names, allowed, shown=f"columns {', '.join(map(str, names))}")
 
 
 @api_function(*PLANNING)
@@ -178,20 +171,14 @@ def replan(
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     old_plan = old if isinstance(old, Plan) else read_plan(Path(old))
     check_same_mission(world, old_plan)
-    return _search_and_write(
-        _with_new_threats(world, old_plan, threats), scenario, (old_plan, at_leg), options, out, overwrite
-    )
+    old_threats = [threat for threat in old_plan.scenario.spec.threats if threat not in world.spec.threats]
+    world = with_threats(world, threat_tables(threats), "threats", old_threats)
+    return _search_and_write(world, scenario, (old_plan, at_leg), options, out, overwrite)
 
 
 def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
     """Return a scenario with another maximum number of evaluations; None returns the scenario unchanged."""
     return scenario if budget is None else with_planner(scenario, "budget", budget=budget)
-
-
-def _with_new_threats(scenario: Scenario, old_plan: Plan, threats: GivenThreats) -> Scenario:
-    """Return a scenario with new threats, and with the threats that only the old plan has."""
-    old_threats = [threat for threat in old_plan.scenario.spec.threats if threat not in scenario.spec.threats]
-    return with_threats(scenario, threat_tables(threats), "threats", old_threats)
 
 
 def _search_and_write(

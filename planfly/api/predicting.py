@@ -16,7 +16,6 @@ from flight.dynamics.fdm import Variation
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from logs.recording.reader import read_log
-from logs.verdict.imported.model_comparison import Reflight
 from planfly.api.api_function import api_function
 from planfly.api.identifying import read_records_and_outputs
 from planfly.api.imported import read_imported
@@ -125,7 +124,11 @@ def predict(
         reason = "a flight log of planfly has no inertial sensors; predict it by its mission"
         raise LogError(f"{path}: {reason}", file=path)
     if motion is not None:
-        _check_options_by_controls(options)
+        defaults = option_defaults(LogOptions)
+        for option, value in options.items():
+            if option != "aircraft" and value != defaults[option]:
+                allowed = "only for a prediction by mission; this one follows the logged controls"
+                raise PlanflyError.of_argument(option, value, allowed)
         predicted = _predict_by_controls(motion, aircraft, start)
     elif start is not None:
         allowed = "only for a prediction by controls; a prediction by mission judges every leg that was followed"
@@ -136,17 +139,18 @@ def predict(
     if out is not None:
         folder = clean_folder(out, PREDICT_FILES, overwrite=True)
         with stage("drawing", "drawing a prediction"):
-            files = _write_page(folder, predicted)
+            # Imported here: only pictures need matplotlib.
+            from logs.views.drawing import draw_chart, png_bytes
+            from logs.views.prediction import band_chart
+            from logs.views.report.prediction import prediction_page
+
+            title = f"{Path(predicted.source).name}, predicted by {predicted.aircraft}"
+            chart = band_chart(predicted.bands, title, by_time=predicted.by == "controls")
+            page, picture = (folder / name for name in PREDICT_FILES)
+            write_atomically(picture, png_bytes(draw_chart(chart)))
+            write_atomically(page, prediction_page(predicted.heading, predicted.bands, chart).encode())
+            files = page, picture
     return replace(predicted, files=files)
-
-
-def _check_options_by_controls(options: LogOptions) -> None:
-    """Raise PlanflyError for an option that has no effect if the logged controls are followed."""
-    defaults = option_defaults(LogOptions)
-    for name, value in options.items():
-        if name != "aircraft" and value != defaults[name]:
-            allowed = "only for a prediction by mission; this one follows the logged controls"
-            raise PlanflyError.of_argument(name, value, allowed)
 
 
 def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
@@ -219,7 +223,13 @@ def _choose_judged_start(
     records: usable segments of the log.
     """
     first_time, last_time = motion.inertial.time[[0, -1]].tolist()
-    used = _find_used_end(aircraft, motion.sha256, first_time)
+    used = None
+    file = aircraft.folder / "posterior.toml"
+    if file.is_file():
+        # The log is recognised by the hash of its data; parts that end before its first time are ignored.
+        entries = [log for log in read_toml(file, "uncertainty").get("log", []) if log.get("sha256") == motion.sha256]
+        ends = [end for entry in entries if (end := float(entry.get("until_s", math.inf))) > first_time]
+        used = max(ends, default=None)
     if used is None:
         return float(np.median(np.concatenate([record.time for record in records]))) if start is None else start
     if used >= last_time:
@@ -230,22 +240,6 @@ def _choose_judged_start(
         allowed = f"expected at least {used:g} s, because {aircraft.name} was identified from the rows before this time"
         raise PlanflyError.of_argument("start", start, allowed)
     return used if start is None else start
-
-
-def _find_used_end(aircraft: Aircraft, sha256: str, start: float) -> float | None:
-    """Return the time up to which a log was used to identify an aircraft, s; infinity for the whole log.
-
-    Returns None if no part of the log was used.  Logs are recognised by the hash of their data.
-
-    sha256: hash of the log's data.
-    start: first time that is read, s of the log; parts that end earlier are ignored.
-    """
-    file = aircraft.folder / "posterior.toml"
-    if not file.is_file():
-        return None
-    entries = [entry for entry in read_toml(file, "uncertainty").get("log", []) if entry.get("sha256") == sha256]
-    ends = [end for entry in entries if (end := float(entry.get("until_s", math.inf))) > start]
-    return max(ends, default=None)
 
 
 def draw_flight_variations(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
@@ -294,7 +288,11 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     name = str(aircraft.folder) if not aircraft.is_embedded else aircraft.name
     with stage("flying by draws") as advance:
         flights = fly_draws(setup, track, name, draw_flight_variations(aircraft), advance)
-    bands = _compute_profile_bands(flights)
+    # The bands are over the distance along the legs.
+    flown_profile, bands = flights[0].flown, []
+    for field, (quantity, unit, factor) in _PROFILE_QUANTITIES.items():
+        low, high = band_limits(np.stack([factor * getattr(flight.model, field) for flight in flights]))
+        bands.append(Band(quantity, unit, flights[0].distance, low, high, factor * getattr(flown_profile, field)))
     stretch = flights[0].stretch
     heading = (
         f"{path} by its mission: {stretch.mode} from {stretch.start:.1f} s to {stretch.end:.1f} s, {len(flights)} of"
@@ -304,7 +302,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     ends = tuple(flights[0].ends.tolist())
     return Predicted(
         "mission",
-        bands,
+        tuple(bands),
         len(flights),
         0,
         stretch.start,
@@ -315,15 +313,6 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
         lines,
         leg_ends=ends,
     )
-
-
-def _compute_profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
-    """Return the band of each quantity of simulated flights, over the distance along the legs."""
-    flown_profile, bands = flights[0].flown, []
-    for field, (name, unit, factor) in _PROFILE_QUANTITIES.items():
-        low, high = band_limits(np.stack([factor * getattr(flight.model, field) for flight in flights]))
-        bands.append(Band(name, unit, flights[0].distance, low, high, factor * getattr(flown_profile, field)))
-    return tuple(bands)
 
 
 def _format_band_lines(bands: Sequence[Band]) -> list[str]:
@@ -339,17 +328,3 @@ def _format_band_lines(bands: Sequence[Band]) -> list[str]:
         lines.append(f"  {band.name:<12} {100.0 * band.inside:.1f} % of {part}the flight inside, {width}{unchanged}")
     note = uninformative_note(bands)
     return [*lines, f"  {note}"] if note else lines
-
-
-def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:
-    """Write the page and the picture of a prediction into a folder, and return both files."""
-    from logs.views.drawing import draw_chart, png_bytes
-    from logs.views.prediction import band_chart
-    from logs.views.report.prediction import prediction_page
-
-    title = f"{Path(predicted.source).name}, predicted by {predicted.aircraft}"
-    chart = band_chart(predicted.bands, title, by_time=predicted.by == "controls")
-    page, picture = (folder / name for name in PREDICT_FILES)
-    write_atomically(picture, png_bytes(draw_chart(chart)))
-    write_atomically(page, prediction_page(predicted.heading, predicted.bands, chart).encode())
-    return page, picture

@@ -13,17 +13,16 @@ from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import INTERRUPTED, Recorder
-from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
+from logs.verdict.returns.drawn_returns import drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
 from logs.verdict.returns.judge_returns import (
     Returns,
-    ReturnWorld,
     judge_returns,
     make_return_world,
     unknown_energy_text,
 )
-from logs.verdict.returns.return_starts import ReturnStarts, return_starts
+from logs.verdict.returns.return_starts import return_starts
 from logs.verdict.returns.returns_text import (
     describe_causes,
     describe_landing,
@@ -58,7 +57,7 @@ from world.scenario import with_terrain
 from world.wording import count_text
 
 if TYPE_CHECKING:
-    from planfly.workflow.imported_flights import ImportedFlight
+    pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,10 +236,19 @@ def returns(
     """
     check_arguments(every=every, points=points)
     path = Path(what) if isinstance(what, str | Path) else None
-    request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
+    program = None if sitl is None else check_program(sitl)
+    if program is not None:
+        check_is_arduplane(program)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        check_output_folder(folder, overwrite)
+    request = _ReturnsRequest(every, suggest, folder, overwrite, program, points)
     if path is not None and is_imported_log(path):
         check_keywords_not_given(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
-        imported = _read_imported_flight(path, options)
+        # Imported here: only this call needs the libraries that read the logs of other programs.
+        from planfly.api.imported import read_imported
+
+        imported = read_imported(path, **options)
         return _judge_flight(imported.setup, imported.track, request, imported.ended)
     check_keywords_not_given(
         str(path or "mission"),
@@ -256,15 +264,14 @@ def returns(
         if terrain is not None:
             setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
         return _judge_flight(setup, what.track, request, what.ended or INTERRUPTED)
-    return _judge_mission(open_flight(what, flight_options), request)
-
-
-def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
-    """Read and judge a flight from the log of another program."""
-    # Imported here: only this call needs the libraries that read the logs of other programs.
-    from planfly.api.imported import read_imported
-
-    return read_imported(path, **options)
+    setup = open_flight(what, flight_options)
+    # Errors are raised before the flight.
+    world = make_return_world(setup)
+    if request.program is not None:
+        check_returns_as_arduplane(world, request.program)
+    with stage("flying the mission"):
+        flight = fly_and_judge(setup, reference="never")
+    return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 
 class _ReturnsRequest(NamedTuple):
@@ -276,32 +283,6 @@ class _ReturnsRequest(NamedTuple):
     overwrite: bool
     program: Path | None
     points: int
-
-
-def _check_request(
-    every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
-) -> _ReturnsRequest:
-    """Check the options of `returns`, and collect them in a request.
-
-    The arguments are described by `returns`.  Raises PlanflyError for a folder that is a file or is not empty, and for
-    a program that is not ArduPlane.
-    """
-    program = None if sitl is None else check_program(sitl)
-    if program is not None:
-        check_is_arduplane(program)
-    if out is not None:
-        check_output_folder(Path(out), overwrite)
-    return _ReturnsRequest(every, suggest, None if out is None else Path(out), overwrite, program, points)
-
-
-def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResult:
-    """Fly a mission, and judge the returns of its flight."""
-    world = make_return_world(setup)  # Raises errors before the flight.
-    if request.program is not None:
-        check_returns_as_arduplane(world, request.program)
-    with stage("flying the mission"):
-        flight = fly_and_judge(setup, reference="never")
-    return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
@@ -326,12 +307,34 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
         with stage("gliding without the engine"):
             result = ReturnsResult(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
         if request.suggest and not result.safe and result.returns.each:
-            result = replace(result, suggested=_suggest_remedies(world, starts, result, request.every))
+            # Remedies do not help a return that sinks to the ground in a take-off or a landing.
+            judged_times = [judged_return.time for judged_return in result.returns.each]
+            airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))
+            with stage("looking for remedies"):
+                remedies = suggest_parameters(world, airborne_starts)
+                rally = suggest_rally_points(world, airborne_starts)
+            remedies += [] if rally is None else [rally]
+            with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
+                trials = [
+                    RemedyTrial(remedy, judge_returns(remedy.apply_to(world), starts, request.every, fly_return))
+                    for remedy in remedies
+                ]
+            helpful_trials = tuple(trial for trial in trials if is_improvement(result.returns, trial.returns))
+            result = replace(result, suggested=helpful_trials)
         if request.folder is None or not result.returns.each:
             return result
         with stage("drawing", "drawing returns"):
             drawn_returns_data = drawn_returns(world, starts, judged_returns, result.glides)
-            files = _draw_files(setup, track, drawn_returns_data)
+            # Imported here: only pictures need matplotlib.
+            from logs.views.figures import draw_pictures, return_views
+
+            flown_track = track if len(track) else None
+            lines = [plan_line(setup), *([track_line(setup, track)] if len(track) else [])]
+            lines += return_lines(setup, drawn_returns_data, flown_track)
+            zones = [*map_zones(setup), *glide_shapes(setup, drawn_returns_data)]
+            text = kml_text(f"{setup.scenario.name} returns", lines, zones)
+            pictures = draw_pictures(return_views(setup, drawn_returns_data, flown_track))
+            files = {**pictures, "returns.kml": text.encode("utf-8")}
         folder = clean_folder(request.folder, RETURN_FILES, overwrite=request.overwrite)
         for name, data in files.items():
             write_atomically(folder / name, data)
@@ -345,38 +348,3 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
             recorder.finish(end_reason, returns=drawn_returns_data)
         names.append("returns.mcap")
     return replace(result, files=tuple(folder / name for name in names))
-
-
-def _suggest_remedies(
-    world: ReturnWorld, starts: ReturnStarts, result: ReturnsResult, every: float
-) -> tuple[RemedyTrial, ...]:
-    """Simulate the returns again with each possible remedy, and return the remedies that help.
-
-    starts: starts of the returns in `result`.
-    every: time between the starts of two returns, s.
-    """
-    # Remedies do not help a return that sinks to the ground in a take-off or a landing.
-    judged_times = [judged_return.time for judged_return in result.returns.each]
-    airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))
-    with stage("looking for remedies"):
-        remedies = suggest_parameters(world, airborne_starts)
-        rally = suggest_rally_points(world, airborne_starts)
-    remedies += [] if rally is None else [rally]
-    with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
-        trials = [
-            RemedyTrial(remedy, judge_returns(remedy.apply_to(world), starts, every, fly_return)) for remedy in remedies
-        ]
-    return tuple(trial for trial in trials if is_improvement(result.returns, trial.returns))
-
-
-def _draw_files(setup: FlightSetup, track: Track, returns: DrawnReturns) -> dict[str, bytes]:
-    """Draw the pictures and the KML map of returns; return the bytes by file name."""
-    # Imported here: only pictures need matplotlib.
-    from logs.views.figures import draw_pictures, return_views
-
-    tracks = [track_line(setup, track)] if len(track) else []
-    lines = [plan_line(setup), *tracks, *return_lines(setup, returns, track if tracks else None)]
-    zones = [*map_zones(setup), *glide_shapes(setup, returns)]
-    text = kml_text(f"{setup.scenario.name} returns", lines, zones)
-    pictures = draw_pictures(return_views(setup, returns, track if tracks else None))
-    return {**pictures, "returns.kml": text.encode("utf-8")}

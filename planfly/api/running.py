@@ -238,9 +238,15 @@ def _fly_rounds(
             on_round(flown_rounds[-1])
         return flown_rounds[-1].verdict, flown_rounds[-1].flown
 
-    _, round_entries = refine_rounds(
-        scenario, refine, plan_and_fly_round, lambda number: _move_round_results(folder, number)
-    )
+    def move_round_results(number: int) -> None:
+        """Move the results of a round to its own subfolder before the next round."""
+        round_folder = folder / f"round-{number}"
+        round_folder.mkdir(exist_ok=True)
+        for name in RUN_FILES:
+            if (folder / name).exists():
+                (folder / name).replace(round_folder / name)
+
+    _, round_entries = refine_rounds(scenario, refine, plan_and_fly_round, move_round_results)
     if refine:
         write_atomically(folder / "rounds.json", json.dumps(round_entries, indent=1) + "\n")
     *earlier_rounds, last_round = (
@@ -312,12 +318,3 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         return_summary=summary,
         engine=flight.engine,
     )
-
-
-def _move_round_results(folder: Path, number: int) -> None:
-    """Move the results of a round to its own subfolder before the next round."""
-    round_folder = folder / f"round-{number}"
-    round_folder.mkdir(exist_ok=True)
-    for name in RUN_FILES:
-        if (folder / name).exists():
-            (folder / name).replace(round_folder / name)

@@ -27,6 +27,7 @@ from logs.verdict.measures.photo_lines import (
 from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
+from logs.verdict.rules.survey_rule import crab_text
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.api_function import api_function
@@ -112,6 +113,7 @@ class SurveyResult:
         """Summary of all photo lines and of overlaps that are too small, in one line."""
         faults = [fault for overlap in self.overlaps for fault in overlap_faults(overlap).values()]
         faults += [slow_camera_text(overlap) for overlap in self.overlaps if overlap and overlap.is_camera_limited]
+        faults += [crab_text(overlap) for overlap in self.overlaps if overlap and overlap.is_side_unknown]
         return "; ".join([lines_headline([line for lines in self.lines for line in lines]), *dict.fromkeys(faults)])
 
     @property
@@ -134,7 +136,8 @@ class SurveyResult:
             texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
         factor = self.setup.autopilot.speeds.true_airspeed_factor
         notes = camera_notes(self.setup.mission, self.setup.demanded_route, self.setup.scenario.wind, factor)
-        texts += [f"note: {note}" for note in notes]
+        gate_notes = [note for note in self.setup.demanded_route.notes if note.endswith(GATES_ARE_NO_WAYPOINTS)]
+        texts += [f"note: {note}" for note in (*notes, *gate_notes)]
         return (*texts, self.circles) if self.circles else tuple(texts)
 
     @property
@@ -196,7 +199,18 @@ def survey(
     options: options of a mission, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
-    user_camera = _parse_camera(camera)
+    user_camera = None
+    if camera is not None:
+        try:
+            camera_numbers = tuple(float(number) for number in camera)
+        except (TypeError, ValueError):
+            camera_numbers = ()
+        if isinstance(camera, str | bytes) or not is_valid_camera(camera_numbers):
+            allowed = f"expected {CAMERA_FORMAT}, such as (23.5, 15.6, 16)"
+            raise ArgumentError.of_argument("camera", camera, allowed, shown=repr(camera))
+        width, height, focal_length, *overlaps = camera_numbers
+        front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)
+        user_camera = Camera(width / focal_length, height / focal_length, front_overlap, side_overlap)
     fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
         check_output_folder(Path(out), overwrite)
@@ -209,31 +223,29 @@ def survey(
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude, so the bank at the photos is unknown", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_with_parallel_lines_as_survey(what.setup.scenario)), user_camera)
-        return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
+        _check_has_survey(setup)
+        requirements = route_requirements(setup)
+        verdict = judge_flight(setup, what.track, what.ended or "", requirements=requirements)
+        return _write_results(_measure_survey(requirements, what.track, verdict), out, overwrite)
 
     planned_setup = open_flight(what, options)
     setup = _with_camera(planned_setup.in_scenario(_with_parallel_lines_as_survey(planned_setup.scenario)), user_camera)
-    return _write_results(_fly_survey(setup, suggest), out, overwrite)
-
-
-def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
-    """Convert the numbers of a camera, see `survey`, to a `Camera`; return None for None.
-
-    Raises ArgumentError for invalid numbers.
-    """
-    if numbers is None:
-        return None
-    try:
-        camera_numbers = tuple(float(number) for number in numbers)
-    except (TypeError, ValueError):
-        camera_numbers = ()
-    if isinstance(numbers, str | bytes) or not is_valid_camera(camera_numbers):
-        raise ArgumentError.of_argument(
-            "camera", numbers, f"expected {CAMERA_FORMAT}, such as (23.5, 15.6, 16)", shown=repr(numbers)
-        )
-    width, height, focal_length, *overlaps = camera_numbers
-    front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)
-    return Camera(width / focal_length, height / focal_length, front_overlap, side_overlap)
+    _check_has_survey(setup)
+    with flying_stage(setup, "flying a survey") as advance:
+        flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
+    result = _measure_survey(route_requirements(flight.setup), flight.track, flight.verdict)
+    if suggest and not result.usable and not result.unknown_lines:
+        with stage("looking for what would help") as advance:
+            step_counter = count(1)
+            trials = find_survey_remedies(
+                flight.setup,
+                uav_of_setup(setup),
+                flight.verdict,
+                lambda text: advance(next(step_counter), 0.0, text),
+                result.overlaps,
+            )
+        result = replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
+    return _write_results(result, out, overwrite)
 
 
 def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
@@ -256,26 +268,6 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
         setup,
         mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(photo=None, turn_around=0.0, camera=camera))),
     )
-
-
-def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
-    """Fly a mission, measure its photo lines, and look for remedies if requested."""
-    _check_has_survey(setup)
-    with flying_stage(setup, "flying a survey") as advance:
-        flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
-    result = _measure_survey(route_requirements(flight.setup), flight.track, flight.verdict)
-    if not suggest or result.usable or result.unknown_lines:
-        return result
-    with stage("looking for what would help") as advance:
-        step_counter = count(1)
-        trials = find_survey_remedies(
-            flight.setup,
-            uav_of_setup(setup),
-            flight.verdict,
-            lambda text: advance(next(step_counter), 0.0, text),
-            result.overlaps,
-        )
-    return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
 
 
 def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool) -> SurveyResult:
@@ -303,27 +295,22 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
             write_atomically(path, mission_text(mission, kind))
             files.append(path)
         if remedy.kind == "parameter":
+            # The user's parameter file with the remedy's value; without such a file, only this parameter.
+            params, parameter_set = result.setup.scenario.flight.params, result.setup.autopilot.parameters
+            if params is not None and isinstance(parameter_set, ParameterSet):
+                file, definition = Path(params), parameter_set.table.by_name[remedy.name]
+                text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
+                names = parameter_set.table.by_any_name.items()
+                values = {name: remedy.value / factor for name, (known, factor) in names if known == definition}
+                text = with_parameter(text, params, values)
+            elif result.setup.autopilot.name == PX4:
+                text = px4_parameter_text(remedy.name, remedy.value, result.setup.autopilot.version)
+            else:
+                text = parameters_text({remedy.name: remedy.value}, "suggested by planfly survey")
             path = folder / "parameter.param"
-            write_atomically(path, _format_remedy_parameters(result.setup, remedy))
+            write_atomically(path, text)
             files.append(path)
     return replace(result, files=tuple(files))
-
-
-def _format_remedy_parameters(setup: FlightSetup, remedy: SurveyRemedy) -> str:
-    """Return the user's parameter file as text, with the remedy's value of its parameter.
-
-    If the scenario names no parameter file, the text contains only this parameter.
-    """
-    params_path, parameter_set = setup.scenario.flight.params, setup.autopilot.parameters
-    if params_path is not None and isinstance(parameter_set, ParameterSet):
-        file, definitions = Path(params_path), parameter_set.table.by_any_name
-        text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
-        definition = parameter_set.table.by_name[remedy.name]
-        units = {name: factor for name, (known, factor) in definitions.items() if known == definition}
-        return with_parameter(text, params_path, {name: remedy.value / factor for name, factor in units.items()})
-    if setup.autopilot.name == PX4:
-        return px4_parameter_text(remedy.name, remedy.value, setup.autopilot.version)
-    return parameters_text({remedy.name: remedy.value}, "suggested by planfly survey")
 
 
 def _with_parallel_lines_as_survey(scenario: Scenario) -> Scenario:
@@ -342,13 +329,6 @@ def _check_has_survey(setup: FlightSetup) -> None:
             f"{source}: no survey found; expected at least three parallel lines, or two with photos along them{reason}",
             file=source,
         )
-
-
-def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> SurveyResult:
-    """Judge a recorded survey flight, and measure its photo lines."""
-    _check_has_survey(setup)
-    requirements = route_requirements(setup)
-    return _measure_survey(requirements, track, judge_flight(setup, track, end_reason, requirements=requirements))
 
 
 def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyResult:

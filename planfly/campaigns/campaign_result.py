@@ -128,6 +128,10 @@ class CampaignResult:
 
         The place of the smallest margin of each rule has three columns: ``place_RULE_kind`` (such as "leg", None if not
         judged), ``place_RULE_index`` and ``place_RULE_item``, NaN if there is none.
+
+        Drawn wind speeds (m/s) and directions (degrees) are added to the scenario's wind; ``mass``, ``drag``,
+        ``control_power`` and ``battery`` are factors.  ``margin_RULE`` has the unit of the rule in docs/campaigns.md
+        (m, m/s, degrees, Wh or %), and ``energy_left`` is in Wh.
         """
         columns = with_place_numbers(self.columns)
         try:

@@ -67,9 +67,9 @@ QUANTITIES = (
     Quantity("control_power", "factor", "", 0.25, 2.0, "control power"),
     Quantity("battery", "factor", "", 0.05, 1.5, "battery"),
     Quantity("terrain_height", "added", "m", -100.0, 100.0, "terrain height"),
-    Quantity("start_east", "added", "m", -200.0, 200.0, "start, east"),
-    Quantity("start_north", "added", "m", -200.0, 200.0, "start, north"),
-    Quantity("start_up", "added", "m", -100.0, 100.0, "start, height"),
+    Quantity("start_east", "added", "m", -200.0, 200.0, "start position east"),
+    Quantity("start_north", "added", "m", -200.0, 200.0, "start position north"),
+    Quantity("start_up", "added", "m", -100.0, 100.0, "start altitude"),
 )
 # Quantities by name.
 QUANTITY_BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}

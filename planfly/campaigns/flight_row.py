@@ -352,9 +352,10 @@ def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:
-    """Return the smallest margin of each judged rule, in the order of the verdict.
+    """Return the smallest margin of each judged rule with its tolerance, in the order of the verdict.
 
-    The margin of the rule `threat` is the distance outside the nearest missile's sphere.
+    A margin is therefore negative only if the rule fails.  The margin of the rule `threat` is the distance outside the
+    nearest missile's sphere.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
@@ -365,7 +366,10 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
     for finding in findings:
         if finding.ok is not None and MARGIN_SCALES[finding.rule] is not None:
             is_threat = finding.rule == "threat"
-            ranked = replace(finding, margin=finding.nearest_distance, unit="m") if is_threat else finding
+            margin = None if finding.margin is None else finding.margin + (finding.tolerance or 0.0)
+            ranked = replace(finding, margin=margin)
+            if is_threat:
+                ranked = replace(finding, margin=finding.nearest_distance, unit="m")
             findings_by_rule.setdefault(finding.rule, []).append(ranked)
     closest_findings = [closest_to_limit(findings_of_rule) for findings_of_rule in findings_by_rule.values()]
     # A rule that fails for a reason other than its value has no margin.

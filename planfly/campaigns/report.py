@@ -4,12 +4,11 @@ import json
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -26,7 +25,6 @@ from planfly.campaigns.find_winds import (
     BOUNDARY_ACCURACY_MPS,
     CALM_MPS,
     MIN_FLIGHTS_PER_DIRECTION,
-    CalmFailures,
     WindsAnswer,
     WindsResult,
 )
@@ -396,6 +394,15 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
             directions, _deciding_rules(winds), reasons, winds.estimated, strict=True
         )
     ]
+    # Failures in the weakest wind.
+    calm_data = None
+    if (calm := winds.calm) is not None:
+        calm_data = {
+            "speed_mps": round(calm.speed, 3),
+            "flights": calm.flights,
+            "not_flyable": calm.failed_count,
+            "failed_by_rule": failures_document(calm.by_rule),
+        }
     data = {
         "schema": WINDS_SCHEMA,
         "name": base.name,
@@ -424,31 +431,15 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
             }
             for k, direction in enumerate(directions)
         ],
-        "calm": None if winds.calm is None else _calm_document(winds.calm),
+        "calm": calm_data,
         "spread": base.dispersions.to_json(),
         "conditions": None if winds.conditions is None else asdict(winds.conditions),
     }
     picture = png_bytes(figure)
-    page = _winds_page(base.name, figure, winds, rows, command).render()
-    write_atomically(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
-    write_atomically(folder / "winds.png", picture)
-    write_atomically(folder / "winds.html", page)
-
-
-def _winds_page(
-    name: str, figure: Figure, winds: WindsResult, rows: Sequence[tuple[str, ...]], command: str
-) -> AnswerPage:
-    """Return the page of a go/no-go chart, with a table of the boundaries.
-
-    name: name of the campaign.
-    figure: the chart.
-    rows: cells of the table, one row for each wind direction.
-    command: the command line that repeats the search.
-    """
     titles = ("wind from", "boundary", "interval", "flights", "fails most often", "judged")
-    return AnswerPage(
+    page = AnswerPage(
         command_name="winds",
-        name=name,
+        name=base.name,
         heading="wind in which it is flyable",
         style=_ANSWER_STYLES[winds.answer],
         lines=wind_lines(winds),
@@ -456,17 +447,10 @@ def _winds_page(
         tables=[PageTable([(title, "n") for title in titles], rows)],
         explanation=[_BOUNDARY_EXPLANATION],
         command=command,
-    )
-
-
-def _calm_document(calm: CalmFailures) -> dict[str, Any]:
-    """Return the failures in the weakest wind as data for a JSON document."""
-    return {
-        "speed_mps": round(calm.speed, 3),
-        "flights": calm.flights,
-        "not_flyable": calm.failed_count,
-        "failed_by_rule": failures_document(calm.by_rule),
-    }
+    ).render()
+    write_atomically(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_atomically(folder / "winds.png", picture)
+    write_atomically(folder / "winds.html", page)
 
 
 def _speed_text(speed: float, max_speed: float) -> str:
@@ -511,20 +495,6 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
     ]
 
 
-def _lost_lines(winds: WindsResult) -> list[str]:
-    """Return a line about the flights that could not be flown; [] if there are none."""
-    if not winds.lost:
-        return []
-    flight_texts = ", ".join(
-        f"{number} ({winds.flights[number][1]:.1f} m/s from {winds.from_deg(winds.flights[number][0]):g}°)"
-        for number in winds.lost[:10]
-    )
-    return [
-        f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died, and count"
-        f" as not flyable: {flight_texts}"
-    ]
-
-
 def _deciding_rules(winds: WindsResult) -> list[str]:
     """Return, for each direction, the rule that fails the most flights up to its boundary; "" for none."""
     return [deciding_rule(by_rule) for by_rule in winds.failures] or [""] * len(winds.boundaries)
@@ -558,30 +528,31 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
     """
     if winds.is_only_calm or all(winds.estimated):
         return []
-    texts = [
-        None if is_estimated else _bounds_text(*bounds)
-        for is_estimated, bounds in zip(winds.estimated, winds.flown_bounds, strict=True)
-    ]
+    texts: list[str | None] = []
+    # Strongest wind without a failure up to it, and weakest wind with a failure; None if there is none.
+    for is_estimated, (flyable, failed) in zip(winds.estimated, winds.flown_bounds, strict=True):
+        if is_estimated:
+            texts.append(None)
+        else:
+            parts = [] if flyable is None else [f"no failure up to {flyable:.1f} m/s"]
+            parts += [] if failed is None else [f"weakest failure at {failed:.1f} m/s"]
+            texts.append(", ".join(parts) or "not enough flights")
     counts = winds.flight_counts()
-    lines = ["directions in which the boundary is not proven, with the wind speed that their own flights suggest:"]
+    left_out = {*winds.lost, *(number for number, _ in winds.undecided)}
+    failed_counts = Counter(
+        direction
+        for number, (direction, _, is_flyable) in enumerate(winds.flights)
+        if not is_flyable and number not in left_out
+    )
+    lines = ["directions in which the boundary is not proven, with their own flights:"]
     for text, group in groupby(range(len(texts)), key=lambda number: texts[number]):
         if text is not None:
             numbers = list(group)
             last = f" to {winds.from_deg(numbers[-1]):g}°" if len(numbers) > 1 else ""
             flights = count_text(sum(counts[number] for number in numbers), "flight")
-            lines.append(f"  from {winds.from_deg(numbers[0]):g}°{last}: {text} ({flights})")
+            failed_count = sum(failed_counts[number] for number in numbers)
+            lines.append(f"  from {winds.from_deg(numbers[0]):g}°{last}: {text} ({failed_count} of {flights} failed)")
     return lines
-
-
-def _bounds_text(flyable: float | None, failed: float | None) -> str:
-    """Return the text of the strongest wind without a failure and of the weakest wind with one, m/s.
-
-    flyable: strongest wind without a failure up to it; None if there is none.
-    failed: weakest wind with a failure; None if there is none.
-    """
-    if failed is None:
-        return "not enough flights" if flyable is None else f"at least {flyable:.1f} m/s"
-    return f"below {failed:.1f} m/s" if flyable is None else f"between {flyable:.1f} and {failed:.1f} m/s"
 
 
 def _boundary_lines(winds: WindsResult) -> list[str]:
@@ -648,6 +619,16 @@ def wind_lines(winds: WindsResult) -> list[str]:
     if directions_by_rule:
         texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
         deciding_lines = [f"most frequent failure in winds up to the boundary: {'; '.join(texts)}"]
+    lost_lines = []
+    if winds.lost:
+        flight_texts = ", ".join(
+            f"{number} ({winds.flights[number][1]:.1f} m/s from {winds.from_deg(winds.flights[number][0]):g}°)"
+            for number in winds.lost[:10]
+        )
+        lost_lines = [
+            f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died, and"
+            f" count as not flyable: {flight_texts}"
+        ]
     return [
         *answer_lines,
         *calm_lines,
@@ -655,7 +636,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *deciding_lines,
         *_lines_without_failures(winds),
-        *_lost_lines(winds),
+        *lost_lines,
         flights_text,
     ]
 

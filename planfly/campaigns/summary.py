@@ -186,6 +186,17 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         has_failed = np.array([rule in failed for failed in failed_rules], dtype=bool)
         known_margins = store.column(words.margin_column)
         margins[rule] = np.where(has_failed & ~(known_margins < 0.0), -np.inf, known_margins)
+    # The rules that the most flights failed (ties included) decide the campaign.  Without failures, it is the rule with
+    # the smallest ratio of mean margin to standard deviation, if any margin is known.
+    rules_that_decide = deciding_rules(by_rule)
+    if not by_rule:
+        reliability_indices = {}
+        for rule, rule_margins in margins.items():
+            known_margins = rule_margins[np.isfinite(rule_margins)]
+            if known_margins.size:
+                deviation = float(known_margins.std())
+                reliability_indices[rule] = float(known_margins.mean()) / deviation if deviation > 0.0 else math.inf
+        rules_that_decide = tuple(sorted(reliability_indices, key=lambda name: reliability_indices[name])[:1])
     is_undecided = estimate.answer == "undecided" and estimate.tally.flown > 0
     # Reason why the mission fails as a whole in nominal conditions.
     mission_fault = ""
@@ -207,7 +218,7 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
                 _margin_unit(store, rule),
                 _rule_sensitivities(base, store, margins[rule]),
             )
-            for rule in _deciding_rules(margins, by_rule)
+            for rule in rules_that_decide
         ),
         ranking=_rank_rules(store, margins, by_rule),
         worst=worst_rows,
@@ -238,26 +249,6 @@ def _margin_quantile(margins: Floats) -> float | None:
     return quantile if math.isfinite(quantile) else None
 
 
-def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]) -> tuple[str, ...]:
-    """Return the rules that decide the campaign: those that the most flights failed (ties included).
-
-    Without failures, it is the rule with the smallest ratio of mean margin to standard deviation.  Returns () if no
-    margin is known.
-
-    margins: margin of each flight, (n,), for each rule.
-    by_rule: failures by rule and place.
-    """
-    if by_rule:
-        return deciding_rules(by_rule)
-    reliability_indices = {}
-    for rule, rule_margins in margins.items():
-        known_margins = rule_margins[np.isfinite(rule_margins)]
-        if known_margins.size:
-            deviation = float(known_margins.std())
-            reliability_indices[rule] = float(known_margins.mean()) / deviation if deviation > 0.0 else math.inf
-    return tuple(sorted(reliability_indices, key=lambda name: reliability_indices[name])[:1])
-
-
 def _rank_rules(
     store: Store, margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]
 ) -> tuple[RankedRule, ...]:
@@ -277,9 +268,11 @@ def _rank_rules(
             if lowest is not None and lowest >= 0.0 and np.isneginf(rule_margins).any():
                 # A flight that failed by an unknown margin has a smaller one.
                 lowest = None
+            failed_count, scale = failed_counts.get(rule, 0), MARGIN_SCALES[rule]
+            order = (-failed_count, math.inf if lowest is None or scale is None else lowest / scale)
             low_margin, unit = _margin_quantile(rule_margins), _margin_unit(store, rule)
-            ranked.append(RankedRule(rule, failed_counts.get(rule, 0), lowest, low_margin, unit))
-    return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled_margin(entry))))
+            ranked.append((order, RankedRule(rule, failed_count, lowest, low_margin, unit)))
+    return tuple(entry for _, entry in sorted(ranked, key=lambda item: item[0]))
 
 
 def _margin_unit(store: Store, rule: str) -> str:
@@ -289,12 +282,6 @@ def _margin_unit(store: Store, rule: str) -> str:
     if place_json is not None:
         return str(json.loads(place_json)["unit"])
     return "" if words.margin is None else words.margin.unit
-
-
-def _scaled_margin(entry: RankedRule) -> float:
-    """Return a rule's smallest margin as a multiple of the rule's scale; inf if the margin is unknown."""
-    scale = MARGIN_SCALES[entry.rule]
-    return math.inf if entry.lowest is None or scale is None else entry.lowest / scale
 
 
 def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tuple[Sensitivity, ...]:
@@ -331,7 +318,24 @@ def summary_json(summary: CampaignSummary) -> str:
     Computing times and the number of workers are left out, so that the text is the same for any number of workers.
     """
     estimate = summary.estimate
-    deciding = [_deciding_data(entry) for entry in summary.deciding]
+    deciding = [
+        {
+            "deciding_rule": entry.rule,
+            "margin_of_one_in_twenty": _to_plain_number(entry.low_margin),
+            "margin_unit": entry.unit,
+            "sensitivities": [
+                {
+                    "quantity": sensitivity.quantity,
+                    "first_order": _to_plain_number(sensitivity.index),
+                    "rank_slope": _to_plain_number(sensitivity.slope),
+                    "p_value": _to_plain_number(sensitivity.p_value),
+                    "shown": sensitivity in entry.drivers,
+                }
+                for sensitivity in entry.sensitivities
+            ],
+        }
+        for entry in summary.deciding
+    ]
     undefined: dict[str, Any] = {
         "deciding_rule": "",
         "margin_of_one_in_twenty": None,
@@ -379,25 +383,6 @@ def summary_json(summary: CampaignSummary) -> str:
         "made_of": summary.made_of,
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def _deciding_data(entry: DecidingRule) -> dict[str, Any]:
-    """Return a deciding rule as data for a JSON document."""
-    return {
-        "deciding_rule": entry.rule,
-        "margin_of_one_in_twenty": _to_plain_number(entry.low_margin),
-        "margin_unit": entry.unit,
-        "sensitivities": [
-            {
-                "quantity": sensitivity.quantity,
-                "first_order": _to_plain_number(sensitivity.index),
-                "rank_slope": _to_plain_number(sensitivity.slope),
-                "p_value": _to_plain_number(sensitivity.p_value),
-                "shown": sensitivity in entry.drivers,
-            }
-            for sensitivity in entry.sensitivities
-        ],
-    }
 
 
 def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
@@ -455,13 +440,28 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         if not tally.undecided
         else f"a share of {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
     )
-    target = summary.goal.target
+    # Number of flights that would decide an undecided target.
+    deciding_flights_lines = []
+    if estimate.answer == "undecided":
+        unjudged_text = " and unjudged" if tally.undecided else ""
+        shares_text = f"the same fraction{'s' if tally.undecided else ''} of flyable{unjudged_text}"
+        flights = summary.deciding_flights
+        if flights is None:
+            flights_text = f"more than {MAX_DECIDING_FLIGHTS:,} flights with {shares_text} flights"
+        elif tally.share == 1.0:
+            flights_text = f"{flights:,} flights without a failure"
+        else:
+            flights_text = f"about {flights:,} flights with {shares_text} flights"
+        deciding_flights_lines.append(f"  {flights_text} would decide the target")
+    target = goal.target
     texts = {
         "reached": f"the probability of a flyable flight is at least {target}",
         "missed": f"the probability of a flyable flight is below {target}",
         "undecided": f"it is undecided whether the probability of a flyable flight is at least {target}",
     }
-    answer_text = texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
+    varied = [QUANTITY_BY_NAME[name].title if name in QUANTITY_BY_NAME else name for name in summary.dispersions]
+    constant = [quantity.title for name, quantity in QUANTITY_BY_NAME.items() if name not in summary.dispersions]
+    answer_text = texts.get(estimate.answer, "no target is set (--prove P or --at-least P)")
     lines = [
         f"{answer_text}: {_flyable_text(tally)}, {share_text}"
         + ("; return not judged" if summary.unjudged_return else ""),
@@ -469,8 +469,10 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         f" confidence; {goal.bound_method})",
         f"  two-sided {confidence_text} interval of the probability: {estimate.interval.low:.4f} to"
         f" {estimate.interval.high:.4f}",
-        *_deciding_flights_lines(summary),
+        *deciding_flights_lines,
         *(f"  {line}" for line in flown_lines(summary.conditions)),
+        f"  Varied around these conditions: {', '.join(varied) or 'nothing'}; the same in every flight:"
+        f" {', '.join(constant) or 'nothing else'}",
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
         *undecided_lines(summary),
     ]
@@ -504,22 +506,26 @@ def deciding_lines(summary: CampaignSummary) -> list[str]:
     choice_text = (
         "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter. "
     )
-    return [
-        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)}."
-        f" {_drivers_text(entry)}"
-        for entry in summary.deciding
-    ]
-
-
-def _low_margin_text(summary: CampaignSummary, entry: DecidingRule) -> str:
-    """Describe the lowest margins of a deciding rule, or its failures if the margins are unknown."""
-    if entry.low_margin is not None:
-        return f"5 % of the flights have a margin below {quantity_text(entry.low_margin, entry.unit)}"
-    failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == entry.rule)
-    flights_text = count_text(summary.estimate.tally.flown, "flight")
-    return (
-        f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} this rule, by an unknown margin"
-    )
+    lines = []
+    for entry in summary.deciding:
+        if entry.low_margin is not None:
+            margin_words = f"5 % of the flights have a margin below {quantity_text(entry.low_margin, entry.unit)}"
+        else:
+            failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == entry.rule)
+            flights_text = count_text(summary.estimate.tally.flown, "flight")
+            verb = "fails" if failed_count == 1 else "fail"
+            margin_words = f"{failed_count} of {flights_text} {verb} this rule, by an unknown margin"
+        if not entry.sensitivities:
+            causes = f"At least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
+        elif not entry.drivers:
+            causes = "None of the varied quantities has a significant effect on this margin"
+        else:
+            causes = "Causes of the margin's variance: " + ", ".join(
+                f"{sensitivity.title} ({100.0 * sensitivity.index:.0f} %)"
+                for sensitivity in entry.drivers[:_MAX_NAMED_QUANTITIES]
+            )
+        lines.append(f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{margin_words}. {causes}")
+    return lines
 
 
 def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
@@ -546,35 +552,6 @@ def _flyable_text(tally: Tally) -> str:
     """Return the number of flyable flights as text, such as "1 of 4 flights is flyable"."""
     text = f"{tally.flyable} of {count_text(tally.flown, 'flight')} {'is' if tally.flyable == 1 else 'are'} flyable"
     return f"{text}, {tally.undecided} not judged in full" if tally.undecided else text
-
-
-def _drivers_text(entry: DecidingRule) -> str:
-    """Return a sentence on the causes of the variance of a deciding rule's margin."""
-    if not entry.sensitivities:
-        return f"At least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
-    if not entry.drivers:
-        return "None of the varied quantities has a significant effect on this margin"
-    return "Causes of the margin's variance: " + ", ".join(
-        f"{sensitivity.title} ({100.0 * sensitivity.index:.0f} %)"
-        for sensitivity in entry.drivers[:_MAX_NAMED_QUANTITIES]
-    )
-
-
-def _deciding_flights_lines(summary: CampaignSummary) -> list[str]:
-    """Return a line on the number of flights that would decide an undecided target; [] for any other target."""
-    if summary.estimate.answer != "undecided":
-        return []
-    flights = summary.deciding_flights
-    shares_text = (
-        "the same fractions of flyable and unjudged"
-        if summary.estimate.tally.undecided
-        else "the same fraction of flyable"
-    )
-    if flights is None:
-        return [f"  more than {MAX_DECIDING_FLIGHTS:,} flights with {shares_text} flights would decide the target"]
-    if summary.estimate.tally.share == 1.0:
-        return [f"  {flights:,} flights without a failure would decide the target"]
-    return [f"  about {flights:,} flights with {shares_text} flights would decide the target"]
 
 
 def _to_plain_number(value: float | None) -> float | None:

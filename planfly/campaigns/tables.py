@@ -613,12 +613,11 @@ def parse_marginal_passes(text: str) -> tuple[MarginalPass, ...]:
     >>> parse_marginal_passes('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
     """
-    return tuple(_make_marginal_pass(**entry) for entry in json.loads(text))
-
-
-def _make_marginal_pass(rule: str, margin: float, **place: Any) -> MarginalPass:
-    """Make a marginal pass from an entry of the JSON text.  place: fields of the place."""
-    return rule, Place(**place), margin
+    passes = []
+    for place_fields in json.loads(text):
+        rule, margin = place_fields.pop("rule"), place_fields.pop("margin")
+        passes.append((rule, Place(**place_fields), margin))
+    return tuple(passes)
 
 
 # ----------------------------------------------------------------------
@@ -706,23 +705,18 @@ def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     with _open_to_read(path) as connection:
-        return {name: _read_arrays(connection, name, COLUMN_FIELDS[name].entry) for name in ARRAY_COLUMNS}
-
-
-def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return a column of arrays, one row per flight: (n, m) numbers or (n, m, 2) pairs, padded with NaN.
-
-    m is the length of the longest array of a flight.
-
-    entry_shape: shape of an entry: () for a number, (2,) for a pair.
-    """
-    count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
-    arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
-    for row, (data,) in zip(arrays, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
-        if data:
-            array = np.frombuffer(data, np.float32)
-            row[: array.size] = array
-    return arrays.reshape(count, arrays.shape[1] // math.prod(entry_shape), *entry_shape)
+        result = {}
+        for name in ARRAY_COLUMNS:
+            # Entries are numbers or pairs; shorter rows are padded with NaN.
+            entry_shape = COLUMN_FIELDS[name].entry
+            count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
+            arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
+            cursor = connection.execute(f"SELECT {name} FROM flights ORDER BY flight")
+            for row, (data,) in zip(arrays, cursor, strict=True):
+                array = np.frombuffer(data or b"", np.float32)
+                row[: array.size] = array
+            result[name] = arrays.reshape(count, arrays.shape[1] // math.prod(entry_shape), *entry_shape)
+        return result
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -156,12 +157,12 @@ class _Probe:
         alpha = self._differentiate(self._evaluate_coefficients, _ANGLE_STEP_RAD)
         beta = self._differentiate(lambda step: self._evaluate_coefficients(0.0, beta=step), _ANGLE_STEP_RAD)
         elevator, aileron, rudder = (
-            self._differentiate(partial(self._with_deflection, k), _SURFACE_STEP_RAD) for k in range(3)
+            self._differentiate(partial(self._vary_axis, "surfaces", k), _SURFACE_STEP_RAD) for k in range(3)
         )
         half_span_time = self._span / (2.0 * self._airspeed)
         half_chord_time = self.chord / (2.0 * self._airspeed)
         roll, pitch, yaw = (
-            self._differentiate(partial(self._with_rate, k), _RATE_STEP_RAD_S) / size
+            self._differentiate(partial(self._vary_axis, "rates", k), _RATE_STEP_RAD_S) / size
             for k, size in enumerate((half_span_time, half_chord_time, half_span_time))
         )
         return Coefficients(
@@ -194,13 +195,12 @@ class _Probe:
             side_yaw=float(yaw[2]),
         )
 
-    def _with_deflection(self, surface: int, deflection: float) -> Floats:
-        """Return the coefficients (6,) at zero angle of attack with one surface deflected, rad."""
-        return self._evaluate_coefficients(0.0, surfaces=deflection * np.eye(3)[surface])
-
-    def _with_rate(self, axis: int, rate: float) -> Floats:
-        """Return the coefficients (6,) at zero angle of attack with an angular rate (rad/s) about one axis."""
-        return self._evaluate_coefficients(0.0, rates=rate * np.eye(3)[axis])
+    def _vary_axis(self, quantity: Literal["surfaces", "rates"], axis: int, value: float) -> Floats:
+        """Return the coefficients (6,) at zero angle of attack with one deflection (rad) or rate (rad/s)."""
+        vector = value * np.eye(3)[axis]
+        if quantity == "surfaces":
+            return self._evaluate_coefficients(0.0, surfaces=vector)
+        return self._evaluate_coefficients(0.0, rates=vector)
 
     def _differentiate(self, function: Callable[[float], Floats], step: float) -> Floats:
         """Return the derivative (6,) of a function of one number at 0, by a central difference."""
@@ -256,7 +256,17 @@ def read_motor(aircraft: Aircraft) -> Motor | None:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {function.get("name", ""): function for function in root.iter("function")}
         if "motor/exit-mps" in functions:
-            return _read_propeller_disc(functions, aircraft.battery_voltage)
+            # A propeller disc.
+            exit_function, thrust_function, power_function = (
+                functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
+            )
+            (exit_speed,) = _read_function_values(exit_function)
+            (area,) = (value for value in _read_function_values(thrust_function) if value != 0.0)
+            # The factor is half the power given to the air, divided by the efficiency.
+            (half_factor,) = _read_function_values(power_function)
+            is_ducted = any((element.text or "").strip() == "motor/airspeed-mps" for element in exit_function.iter("p"))
+            losses, volts = 2.0 * half_factor - 1.0, aircraft.battery_voltage
+            return PropellerDisc(area, exit_speed, is_ducted, losses=losses, voltage=volts, nominal=volts)
         return _read_electric_motor(functions, aircraft.battery_voltage)
     except (KeyError, ValueError, IndexError, StopIteration, OSError, ElementTree.ParseError):
         return None
@@ -265,26 +275,6 @@ def read_motor(aircraft: Aircraft) -> Motor | None:
 def _read_function_values(function: ElementTree.Element) -> list[float]:
     """Return the numbers in a JSBSim function, in the order of the file; NaN for an empty element."""
     return [float(value.text or "nan") for value in function.iter("v")]
-
-
-def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerDisc:
-    """Return the propeller disc of a model, from its JSBSim functions by name.
-
-    Raises KeyError or ValueError for functions of another form.
-
-    volts: nominal voltage of the battery, V.
-    """
-    exit_function, thrust_function, power = (
-        functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
-    )
-    (exit_speed,) = _read_function_values(exit_function)
-    (area,) = (value for value in _read_function_values(thrust_function) if value != 0.0)
-    # The factor is half the power given to the air, divided by the efficiency.
-    (half_factor,) = _read_function_values(power)
-    is_ducted = any(
-        (property_element.text or "").strip() == "motor/airspeed-mps" for property_element in exit_function.iter("p")
-    )
-    return PropellerDisc(area, exit_speed, is_ducted, losses=2.0 * half_factor - 1.0, voltage=volts, nominal=volts)
 
 
 def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> ElectricMotor:

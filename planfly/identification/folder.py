@@ -180,9 +180,20 @@ def make_folder_files(identified: Identified, name: str, battery: tuple[float, f
         lines = [f"# Parameters of {Path(log.source).name} that determine flight; hardware parameters are left out."]
         lines += [f"{name} {value:.9g}" for name, value in sorted(parameters.items())]
         parameter_file = {AIRCRAFT_FILE: "\n".join(lines) + "\n"}
+    servo_lines = ["# Servo output of each control, and the value of the control at each pulse.", ""]
+    for control, output in identified.outputs.items():
+        values = output.value if control == "throttle" else [math.degrees(angle) for angle in output.value]
+        unit = "value" if control == "throttle" else "value_deg"
+        servo_lines += [
+            f"[{control}]",
+            f"output = {output.output}",
+            f"pulse_us = [{', '.join(f'{pulse:g}' for pulse in output.pulse)}]",
+            f"{unit} = [{', '.join(f'{value:.6g}' for value in values)}]",
+            "",
+        ]
     return files | {
         **parameter_file,
-        "ardupilot.toml": _format_servo_file(identified.outputs),
+        "ardupilot.toml": "\n".join(servo_lines),
         "posterior.toml": format_posterior(identified),
         "draws.csv": draws_text(identified.aircraft_draws()),
     }
@@ -283,22 +294,6 @@ def select_flown_parameters(log: MotionLog) -> dict[str, float]:
     }
     flight_parameters = other_parameters | law_parameters.by_origin("file")
     return {name: value for name, value in flight_parameters.items() if not name.startswith(_HARDWARE_PREFIXES)}
-
-
-def _format_servo_file(outputs: Mapping[str, ServoOutput]) -> str:
-    """Return the text of ``ardupilot.toml``: output number, pulses (us) and deflections of each control."""
-    lines = ["# Servo output of each control, and the value of the control at each pulse.", ""]
-    for name, output in outputs.items():
-        values = output.value if name == "throttle" else [math.degrees(angle) for angle in output.value]
-        unit = "value" if name == "throttle" else "value_deg"
-        lines += [
-            f"[{name}]",
-            f"output = {output.output}",
-            f"pulse_us = [{', '.join(f'{pulse:g}' for pulse in output.pulse)}]",
-            f"{unit} = [{', '.join(f'{value:.6g}' for value in values)}]",
-            "",
-        ]
-    return "\n".join(lines)
 
 
 def format_posterior(identified: Identified) -> str:

@@ -11,7 +11,6 @@ from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.draws import DRIVE_POWER
 from aircraft.identification.electric_motor import ElectricMotor
-from aircraft.identification.motor import Motor
 from aircraft.identification.motor_table import MotorTable
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from aircraft.identification.propeller_disc import PropellerDisc
@@ -39,7 +38,21 @@ def format_identified_model(base: Aircraft, name: str, numbers: BaseModel, value
     text = text.replace("ident/", "base/")
     root = ElementTree.fromstring(text, parser=ElementTree.XMLParser(target=ElementTree.TreeBuilder()))
     root.set("name", name)
-    _set_sizes(root, numbers, base)
+    ixx, iyy, izz, ixz = numbers.inertia
+    sizes = {
+        "metrics/wingarea": (numbers.area, "M2"),
+        "metrics/wingspan": (numbers.span, "M"),
+        "metrics/chord": (numbers.chord, "M"),
+        "mass_balance/ixx": (ixx / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/iyy": (iyy / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/izz": (izz / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/ixz": (ixz / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/emptywt": (numbers.mass / _POUND_KG, "LBS"),
+    }
+    for path, (value, unit) in sizes.items():
+        element = _find_part(root, path, base)
+        element.text, element.attrib = f" {number(value)} ", {"unit": unit}
+    _find_part(root, "mass_balance", base).set("negated_crossproduct_inertia", "false")
     base_properties = [
         property_element
         for property_element in root.iter("property")
@@ -51,9 +64,18 @@ def format_identified_model(base: Aircraft, name: str, numbers: BaseModel, value
     # Insert the properties before the elements that read them.
     root.insert(list(root).index(_find_part(root, "flight_control", base)), reactions)
     aerodynamics = _find_part(root, "aerodynamics", base)
-    shared = f"<a>{_format_lift_functions(numbers)}</a>"
+    # The lift coefficients of the base and the estimate; the angle of attack is clipped to +-`_MAX_ALPHA_RAD`.
+    lift_zero, lift_alpha = numbers.coefficients.lift_zero, numbers.coefficients.lift_alpha
+    lift_functions = f"""<a>
+    <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
+      <max> <v> {-_MAX_ALPHA_RAD} </v> <p> aero/alpha-rad </p> </max> </min> </function>
+    <function name="ident/lift-before">
+      <sum> <v> {number(lift_zero)} </v> {_write_product(lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
+    <function name="ident/lift-after">
+      <sum> <v> {number(lift_zero)} </v> <p> ident/lift-offset </p>
+        {_write_product(lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function></a>"""
     first_axis = list(aerodynamics).index(_find_part(root, "aerodynamics/axis", base))
-    for k, function in enumerate(ElementTree.fromstring(shared)):
+    for k, function in enumerate(ElementTree.fromstring(lift_functions)):
         aerodynamics.insert(first_axis + k, function)
     drag = " <p> aero/drag-factor </p>" if "aero/drag-factor" in text else ""
     control = " <p> aero/control-factor </p>" if "aero/control-factor" in text else ""
@@ -101,28 +123,6 @@ def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementT
     return element
 
 
-def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) -> None:
-    """Set wing area, span, chord, moments of inertia and mass of a model.
-
-    base: aircraft of the model, for error messages.
-    """
-    ixx, iyy, izz, ixz = numbers.inertia
-    sizes = {
-        "metrics/wingarea": (numbers.area, "M2"),
-        "metrics/wingspan": (numbers.span, "M"),
-        "metrics/chord": (numbers.chord, "M"),
-        "mass_balance/ixx": (ixx / _SLUG_FT2, "SLUG*FT2"),
-        "mass_balance/iyy": (iyy / _SLUG_FT2, "SLUG*FT2"),
-        "mass_balance/izz": (izz / _SLUG_FT2, "SLUG*FT2"),
-        "mass_balance/ixz": (ixz / _SLUG_FT2, "SLUG*FT2"),
-        "mass_balance/emptywt": (numbers.mass / _POUND_KG, "LBS"),
-    }
-    for path, (value, unit) in sizes.items():
-        element = _find_part(root, path, base)
-        element.text, element.attrib = f" {number(value)} ", {"unit": unit}
-    _find_part(root, "mass_balance", base).set("negated_crossproduct_inertia", "false")
-
-
 # ----------------------------------------------------------------------
 # Write the aerodynamic terms that the estimate adds, from the coefficients of the base.
 
@@ -135,22 +135,6 @@ def _format_factor_minus_one(name: str) -> str:
 def _write_product(coefficient: float, *factors: str) -> str:
     """Return the XML product of a coefficient and of factors given as XML."""
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
-
-
-def _format_lift_functions(numbers: BaseModel) -> str:
-    """Return the JSBSim functions for the lift coefficients of the base and the estimate.
-
-    The angle of attack is clipped to plus or minus `_MAX_ALPHA_RAD`.
-    """
-    c = numbers.coefficients
-    return f"""
-    <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
-      <max> <v> {-_MAX_ALPHA_RAD} </v> <p> aero/alpha-rad </p> </max> </min> </function>
-    <function name="ident/lift-before">
-      <sum> <v> {number(c.lift_zero)} </v> {_write_product(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
-    <function name="ident/lift-after">
-      <sum> <v> {number(c.lift_zero)} </v> <p> ident/lift-offset </p>
-        {_write_product(c.lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function>"""
 
 
 def _format_added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
@@ -232,7 +216,20 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
     )
     base_text = "\n".join(ElementTree.tostring(element, encoding="unicode").strip() for element in base_properties)
     motor = numbers.motor
-    functions = _format_motor_functions(motor)
+    # The functions ``motor/NAME`` by NAME, in order of computation.
+    functions = {
+        "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
+        "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
+    }
+    match motor:
+        case ElectricMotor():
+            functions |= _format_electric_functions(motor)
+        case PropellerDisc():
+            functions |= _format_disc_functions(motor)
+        case MotorTable():
+            functions |= _format_table_functions(motor)
+        case _:
+            raise TypeError(type(motor).__name__)
     functions["battery-power-w"] = f"<product> <p> {DRIVE_POWER} </p> {functions['battery-power-w']} </product>"
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
     # JSBSim wants the moment in lbf ft and the force in lbf: the factors convert from N m and N.
@@ -254,22 +251,6 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
 </force>
 {torque if numbers.has_torque_reaction else ""}
 </external_reactions>"""
-
-
-def _format_motor_functions(motor: Motor) -> dict[str, str]:
-    """Return the XML content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
-    shared = {
-        "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
-        "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
-    }
-    match motor:
-        case ElectricMotor():
-            return shared | _format_electric_functions(motor)
-        case PropellerDisc():
-            return shared | _format_disc_functions(motor)
-        case MotorTable():
-            return shared | _format_table_functions(motor)
-    raise TypeError(type(motor).__name__)
 
 
 def _format_disc_functions(disc: PropellerDisc) -> dict[str, str]:

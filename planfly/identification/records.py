@@ -98,31 +98,42 @@ def flight_records(
     _check_usable(log)
     if log.elevons:
         _check_flying_wing_base(log, aircraft)
-    grid = _make_time_grid(log)
+    # The grid covers the period that all series cover.
+    series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
+    start_time = max(samples.time[0] for samples in series)
+    grid = np.arange(start_time, min(samples.time[-1] for samples in series), 1.0 / GRID_HZ)
     pulses = (
         _hold_samples(log.outputs, grid)
         if len(log.outputs.time)
         else np.zeros((len(grid), log.outputs.values.shape[1]))
     )
+    stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     if len(log.controls.time):
-        controls = _convert_fractions(_hold_samples(log.controls, grid), aircraft, log.angles)
+        # Logged are angles (rad), or fractions of full travel, positive for nose up and yaw to the right; the model's
+        # elevator and rudder have the opposite sign.
+        travel = np.where((*log.angles, True), 1.0, stops)
+        controls = _hold_samples(log.controls, grid) * (np.array([-1.0, 1.0, -1.0, 1.0]) * travel)
     else:
         controls = _convert_pulses(servos or log_outputs(log, aircraft), pulses)
     # A surface that is commanded beyond its stop stays at the stop.
-    stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
     height = _interpolate(log.height, grid)[:, 0]
-    ratio = _interpolate(log.ratio, grid)[:, 0] if len(log.ratio.time) else _compute_true_airspeed_ratio(height)
+    if len(log.ratio.time):
+        ratio = _interpolate(log.ratio, grid)[:, 0]
+    else:
+        # True to equivalent airspeed: the air density of the standard atmosphere decreases with
+        # (1 - 2.25577e-5 h)^4.25588, and the ratio is the inverse square root of the density relative to sea level.
+        ratio = (1.0 - 2.25577e-5 * np.clip(height, -500.0, 9000.0)) ** -2.12794
     airspeed = _interpolate(log.airspeed, grid)[:, 0] * ratio
     inertial = _interpolate(log.inertial, grid)
     attitude = np.column_stack(
         [np.interp(grid, log.attitude.time, np.unwrap(angle)) for angle in log.attitude.values.T]
     )
-    battery = _interpolate(log.battery, grid) if _has_current(log) else np.full((len(grid), 2), np.nan)
+    has_current = len(log.battery.time) > 10 and bool(np.any(log.battery.values[:, 1] > 0.5))
+    battery = _interpolate(log.battery, grid) if has_current else np.full((len(grid), 2), np.nan)
     usable = _find_settled_flight(log, grid, airspeed / ratio, pulses) & (grid < until)
     velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
-    is_blocked = _find_blocked_airspeed(airspeed, velocity[:, :2] - wind, attitude[:, 2])
-    usable = _cut_blocked_rows(log, usable, is_blocked)
+    usable = _cut_blocked_rows(log, usable, airspeed, velocity[:, :2] - wind, attitude[:, 2])
     flight = FlightRecord(
         time=grid,
         acceleration=inertial[:, :3],
@@ -176,21 +187,6 @@ def _convert_pulses(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Float
         controls |= {"elevator": 0.5 * (left + right), "aileron": 0.5 * (left - right)}
     zeros = np.zeros(len(pulses))
     return np.column_stack([controls.get(name, zeros) for name in ("elevator", "aileron", "rudder", "throttle")])
-
-
-def _convert_fractions(fractions: Floats, aircraft: Aircraft, angles: tuple[bool, bool, bool]) -> Floats:
-    """Convert logged fractions of full travel, or angles, to the model's controls (n, 4).
-
-    The controls are elevator, aileron, rudder (rad) and throttle.  Full travel is the maximum deflection of the base
-    aircraft.
-
-    fractions: elevator, aileron, rudder and throttle of the log, (n, 4).
-    angles: True for each surface whose values are angles, rad.
-    """
-    # Positive is nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
-    signs = np.array([-1.0, 1.0, -1.0])
-    travel = np.where(angles, 1.0, [aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder])
-    return np.asarray(fractions * np.append(signs * travel, 1.0))
 
 
 # Message and quantity of each series, by autopilot.
@@ -378,14 +374,6 @@ def _read_pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float
     return min_pulse, trim_pulse, max_pulse, -1.0 if get_parameter(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
 
 
-def _make_time_grid(log: MotionLog) -> Floats:
-    """Return times (n,), s, with the rate `GRID_HZ` over the period that all series of a log cover."""
-    series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
-    start_time = max(samples.time[0] for samples in series)
-    end_time = min(samples.time[-1] for samples in series)
-    return np.arange(start_time, end_time, 1.0 / GRID_HZ)
-
-
 def _interpolate(samples: Samples, grid: Floats) -> Floats:
     """Interpolate each column of the samples linearly at the times of the grid; return (n, columns)."""
     return np.column_stack([np.interp(grid, samples.time, column) for column in samples.values.T])
@@ -395,18 +383,6 @@ def _hold_samples(samples: Samples, grid: Floats) -> Floats:
     """Resample at the times of the grid, (n, columns): each sample holds until the next sample."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
-
-
-def _compute_true_airspeed_ratio(amsl: Floats) -> Floats:
-    """Return the ratio of true to equivalent airspeed in the standard atmosphere.  amsl: altitude, m AMSL."""
-    # The air density of the standard atmosphere decreases with (1 - 2.25577e-5 h)^4.25588, and the ratio is the inverse
-    # square root of the density relative to sea level.
-    return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
-
-
-def _has_current(log: MotionLog) -> bool:
-    """Return True if the log has battery samples and the current ever exceeds 0.5 A."""
-    return len(log.battery.time) > 10 and bool(np.any(log.battery.values[:, 1] > 0.5))
 
 
 def _find_vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
@@ -457,12 +433,13 @@ def _find_settled_flight(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
     return is_usable
 
 
-def _find_blocked_airspeed(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
-    """Return a boolean mask (n,): True where the airspeed sensor is blocked.
+def _cut_blocked_rows(log: MotionLog, usable: Flags, airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
+    """Set the rows of a blocked airspeed sensor to False in a copy of `usable`.
 
     In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind along the
-    heading varies.
+    heading varies.  Raises LogError if too many usable rows are blocked.
 
+    airspeed: (n,) m/s.
     air_velocity: ground velocity minus wind, to north and east, (n, 2) m/s.
     heading: (n,) rad.
     """
@@ -474,16 +451,6 @@ def _find_blocked_airspeed(airspeed: Floats, air_velocity: Floats, heading: Floa
         rows = slice(begin, begin + window_rows)
         if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and air_speed_ahead[rows].std() > _MOVING_AIRSPEED_SD_MPS:
             is_blocked[rows] = True
-    return is_blocked
-
-
-def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags:
-    """Set the rows of a blocked airspeed sensor to False in a copy of `usable`.
-
-    Raises LogError if too many usable rows are blocked.
-
-    is_blocked: True where the airspeed sensor is blocked, (n,).
-    """
     blocked_seconds = float((usable & is_blocked).sum()) / GRID_HZ
     seconds = float(usable.sum()) / GRID_HZ
     if blocked_seconds > _MAX_BLOCKED_FRACTION * seconds:

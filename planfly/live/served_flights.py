@@ -18,7 +18,6 @@ from flight.live.flight_process import (
     DivertFlight,
     FlightJudged,
     JudgeMission,
-    LoiterCenter,
     MissionJudged,
     PreparedFlight,
     ProcessReady,
@@ -236,7 +235,16 @@ class ServedFlights:
         elif request.mode == RTL:
             items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), no_params, 0.0, 0.0, 0.0),)
         else:
-            items = (_make_loiter_item(start_item, request.center),)
+            # A position or an altitude that the center does not state is the current one.
+            center, loiter_item = request.center, start_item
+            if math.isfinite(center.alt):
+                loiter_item = replace(loiter_item, frame=center.frame, alt=center.alt)
+            if math.isfinite(center.lat_deg) and math.isfinite(center.lon_deg):
+                loiter_item = replace(
+                    loiter_item, lat_deg=round_to_grid(center.lat_deg), lon_deg=round_to_grid(center.lon_deg)
+                )
+            loiter_params = (LOITER_DURATION_S, 0.0, center.radius, 0.0)
+            items = (replace(loiter_item, seq=0, command=int(Command.NAV_LOITER_TIME), params=loiter_params),)
         mission = replace(request.mission, items=(start_item, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
         setup = make_setup(without_ground_phases(served_scenario.scenario), self._uav, mission, served_scenario.seed)
@@ -254,25 +262,6 @@ class ServedFlights:
             except FileExistsError:
                 number += 1
         return ServedLog(path, setup, self.aircraft, mode)
-
-
-def _make_loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem:
-    """Return the item of a loiter around `center`.
-
-    A position or an altitude that `center` does not state is taken from `current_item`.
-    """
-    has_position = math.isfinite(center.lat_deg) and math.isfinite(center.lon_deg)
-    item_at_altitude = (
-        replace(current_item, frame=center.frame, alt=center.alt) if math.isfinite(center.alt) else current_item
-    )
-    return replace(
-        item_at_altitude,
-        seq=0,
-        command=int(Command.NAV_LOITER_TIME),
-        params=(LOITER_DURATION_S, 0.0, center.radius, 0.0),
-        lat_deg=round_to_grid(center.lat_deg) if has_position else current_item.lat_deg,
-        lon_deg=round_to_grid(center.lon_deg) if has_position else current_item.lon_deg,
-    )
 
 
 class ServedLog:

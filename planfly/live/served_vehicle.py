@@ -37,7 +37,28 @@ def serve_vehicle(
         exit_stack.callback(link.close)
         pool = _FlightPool(options)
         exit_stack.callback(pool.end_processes)
-        vehicle = _make_vehicle(link, pool, served_scenario, options.speed, on_message)
+        # The vehicle waits at the scenario's start, without a mission.
+        uav = served_scenario.uav
+        autopilot_settings = uav.autopilot.parameters
+        parameters = vehicle_parameters(
+            autopilot_values=partial(autopilot_parameters, served_scenario.scenario),
+            not_simulated=() if autopilot_settings is None else autopilot_settings.not_simulated,
+            airspeed=uav.airspeed,
+            min_airspeed=uav.aircraft.airspeed_min,
+            max_airspeed=uav.aircraft.airspeed_max,
+            max_bank_deg=math.degrees(uav.max_bank),
+            system=SYSTEM,
+            speed=options.speed,
+        )
+        vehicle = Vehicle(
+            link,
+            pool.spawn,
+            parameters,
+            make_standby_at_start(served_scenario.scenario),
+            uav.battery,
+            uav.aircraft.battery_voltage,
+            lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
+        )
         host, port = link.address
         targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
         on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served_scenario.scenario.name}")
@@ -51,40 +72,6 @@ def serve_vehicle(
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)
     if dropped:
         on_message(f"frames dropped: {dropped}")
-
-
-def _make_vehicle(
-    link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
-) -> Vehicle:
-    """Make the vehicle that ground stations see, without a mission and waiting at the scenario's start.
-
-    link: MAVLink connection to the stations.
-    pool: flight processes, which fly the missions.
-    speed: multiple of real time.
-    on_message: called with each message of the vehicle, with the time of day before it.
-    """
-    uav = served_scenario.uav
-    autopilot_settings = uav.autopilot.parameters
-    parameters = vehicle_parameters(
-        autopilot_values=partial(autopilot_parameters, served_scenario.scenario),
-        not_simulated=() if autopilot_settings is None else autopilot_settings.not_simulated,
-        airspeed=uav.airspeed,
-        min_airspeed=uav.aircraft.airspeed_min,
-        max_airspeed=uav.aircraft.airspeed_max,
-        max_bank_deg=math.degrees(uav.max_bank),
-        system=SYSTEM,
-        speed=speed,
-    )
-    standby = make_standby_at_start(served_scenario.scenario)
-    return Vehicle(
-        link,
-        pool.spawn,
-        parameters,
-        standby,
-        uav.battery,
-        uav.aircraft.battery_voltage,
-        lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
-    )
 
 
 class _FlightPool:

@@ -56,8 +56,23 @@ def play_to_foxglove(
     with contextlib.ExitStack() as exit_stack:
         gate = OriginGate(port, {*VIEWERS, *allowed}, lambda reason: on_message(f"foxglove  refused {reason}"))
         exit_stack.callback(gate.close)
-        server = _start_server(foxglove, f"planfly {file.name}", broadcast, gate)
+        # No page can bypass the gate, because no browser trusts the certificate of the server.
+        certificate = make_temporary_certificate()
+        try:
+            server = foxglove.start_server(
+                name=f"planfly {file.name}",
+                host=HOST,
+                port=0,
+                server_listener=broadcast,
+                capabilities=[foxglove.Capability.Time],
+                context=broadcast.context,
+                tls_cert=certificate.certificate.encode(),
+                tls_key=certificate.key.encode(),
+            )
+        except RuntimeError as error:
+            raise OSError(0, str(error), HOST) from error
         exit_stack.callback(server.stop)
+        gate.start_forwarding(server.port, certificate)
         on_message(f"foxglove  ws://{HOST}:{gate.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
         messages = broadcast.record_scenes_until(log_messages(file), round(start * 1e9) + EPOCH_NS)
         clock = RunningClock()
@@ -66,29 +81,6 @@ def play_to_foxglove(
                 raise FlightError.of_argument("foxglove", wait, f"no viewer has subscribed within {wait:g} s", shown="")
             time.sleep(_POLL_INTERVAL_S)
         _play_messages(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, should_stop)
-
-
-def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the Foxglove server behind a gate that checks the origin of each page, and return the server.
-
-    No page can bypass the gate, because no browser trusts the certificate of the server.
-    """
-    certificate = make_temporary_certificate()
-    try:
-        server = foxglove.start_server(
-            name=name,
-            host=HOST,
-            port=0,
-            server_listener=broadcast,
-            capabilities=[foxglove.Capability.Time],
-            context=broadcast.context,
-            tls_cert=certificate.certificate.encode(),
-            tls_key=certificate.key.encode(),
-        )
-    except RuntimeError as error:
-        raise OSError(0, str(error), HOST) from error
-    gate.start_forwarding(server.port, certificate)
-    return server
 
 
 def _play_messages(

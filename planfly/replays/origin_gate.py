@@ -136,7 +136,10 @@ class OriginGate:
                 return
             reason = find_refusal_reason(head, self.port, self._allowed)
             if reason:
-                self._report_refusal(reason)
+                # Each reason is reported once.
+                if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
+                    self._reported.add(reason)
+                    self._on_refused(reason)
                 writer.write(b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
                 await writer.drain()
                 return
@@ -144,12 +147,6 @@ class OriginGate:
             server_reader, server_writer = await server
             server_writer.write(head)
             await asyncio.gather(_forward_data(reader, server_writer), _forward_data(server_reader, writer))
-
-    def _report_refusal(self, reason: str) -> None:
-        """Report each reason for a refusal once, up to `_MAX_REPORTED` different reasons."""
-        if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
-            self._reported.add(reason)
-            self._on_refused(reason)
 
 
 async def _forward_data(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -163,7 +163,12 @@ def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | N
     rtl_command = int(Command.NAV_RETURN_TO_LAUNCH)
     items.append(MissionItem(3, rtl_command, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
     if landing is not None:
-        items += _landing_items(mission.items, landing)
+        # The landing sequence, from DO_LAND_START to the landing.
+        commands = [item.command for item in mission.items]
+        start_index = next(index for index, item in enumerate(mission.items) if item.seq == landing.item)
+        first_index = max(index for index in range(start_index) if commands[index] == Command.DO_LAND_START)
+        last_index = next(index for index in range(start_index, len(commands)) if commands[index] in LANDINGS)
+        items += [replace(item, seq=seq) for seq, item in enumerate(mission.items[first_index : last_index + 1], 4)]
     rally = []
     for number, rally_point in enumerate(world.rally):
         lat, lon = (float(value) for value in to_geo(origin, rally_point.east, rally_point.north))
@@ -172,11 +177,3 @@ def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | N
         rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, height))
     home = None if mission.home is None else replace(mission.home, alt=world.home.up)
     return Mission(home, tuple(items), rally=tuple(rally), source=mission.source)
-
-
-def _landing_items(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
-    """Return the items of a landing sequence, from DO_LAND_START to the landing, numbered from 4."""
-    start_index = next(index for index, item in enumerate(items) if item.seq == landing.item)
-    land_start_index = max(index for index in range(start_index) if items[index].command == Command.DO_LAND_START)
-    end_index = next(index for index in range(start_index, len(items)) if items[index].command in LANDINGS)
-    return [replace(item, seq=number) for number, item in enumerate(items[land_start_index : end_index + 1], 4)]

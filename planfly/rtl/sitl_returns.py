@@ -5,7 +5,6 @@ replaces the simulated result only if it is worse; it never improves a judgement
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -180,7 +179,10 @@ def choose_worst_returns(
     min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
     start_index_by_time = {float(time): start_index for start_index, time in enumerate(starts.time)}
     chosen_returns: list[tuple[SimulatedReturn, int]] = []
-    for candidate in sorted(returns.each, key=_worst_first_key):
+    # Safe returns come last, the closest to a limit first.
+    unsafe_returns = sorted((one for one in returns.each if not one.safe), key=worst_first_key)
+    safe_returns = sorted((one for one in returns.each if one.safe), key=limit_ratio)
+    for candidate in (*unsafe_returns, *safe_returns):
         start_index = start_index_by_time[candidate.time]
         is_near = any(
             np.hypot(*(positions[start_index] - positions[chosen_index])) < min_distance
@@ -197,14 +199,6 @@ def choose_worst_returns(
         if len(chosen_returns) == points:
             break
     return chosen_returns
-
-
-def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
-    """Return a sort key that puts the worst outcome first.
-
-    Safe returns come last, the closest to a limit first.
-    """
-    return (KINDS.index("safe"), limit_ratio(candidate)) if candidate.safe else worst_first_key(candidate)
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
@@ -345,8 +339,19 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
     # The last course is the course over the last five seconds.
     earlier_point = position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))
+    home_altitude = world.autopilot.returns.rules.height + world.home.up
+    targets = [
+        simulated_target,
+        ReturnTarget((world.home.east, world.home.north, home_altitude), "home", "", math.nan),
+        *(
+            ReturnTarget((rally.east, rally.north, rally.up), f"rally point {rally.number or number}", "", math.nan)
+            for number, rally in enumerate(world.rally, 1)
+        ),
+    ]
     best_target, best_rank = simulated_target, math.inf
-    for target in (simulated_target, *_other_targets(world, simulated_target)):
+    for target in targets:
+        if target is not simulated_target and target.name == simulated_target.name:
+            continue
         offset = np.array(_end_position(target)[:2]) - end_point
         distance = math.hypot(*offset)
         course_difference = abs(math.remainder(math.atan2(*offset) - course, math.tau))
@@ -359,18 +364,3 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
         if rank < min(best_rank, 2.0):
             best_target, best_rank = target, rank
     return best_target
-
-
-def _other_targets(world: ReturnWorld, simulated_target: ReturnTarget) -> Iterator[ReturnTarget]:
-    """Yield home and all rally points, except the target of the simulated ArduPlane."""
-    home_altitude = world.autopilot.returns.rules.height + world.home.up
-    positions = [
-        ("home", (world.home.east, world.home.north, home_altitude)),
-        *(
-            (f"rally point {rally_point.number or number}", (rally_point.east, rally_point.north, rally_point.up))
-            for number, rally_point in enumerate(world.rally, 1)
-        ),
-    ]
-    for name, position in positions:
-        if name != simulated_target.name:
-            yield ReturnTarget(position, name, "", math.nan)

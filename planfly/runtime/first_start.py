@@ -37,7 +37,21 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
     """
     remaining_units, lines = deque(units), queue.SimpleQueue[str]()
     process_count = min(PROCESS_COUNT, len(units), os.cpu_count() or 1)
-    processes = [_start_process(folder) for _ in range(process_count)]
+    # Each process compiles units named on its standard input.
+    home = str(Path(__file__).parents[2])
+    path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
+    processes = [
+        subprocess.Popen(
+            [sys.executable, *PYTHON_ARGUMENTS],
+            env=os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            bufsize=1,
+        )
+        for _ in range(process_count)
+    ]
     threads = [
         threading.Thread(target=_feed_process, args=(process, remaining_units, lines), daemon=True)
         for process in processes
@@ -60,24 +74,6 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
         for process, thread in zip(processes, threads, strict=True):
             process.wait()
             thread.join()
-
-
-def _start_process(folder: Path) -> "subprocess.Popen[str]":
-    """Start a process that compiles units named on its standard input.
-
-    folder: cache folder of the kernels.
-    """
-    home = str(Path(__file__).parents[2])
-    path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
-    return subprocess.Popen(
-        [sys.executable, *PYTHON_ARGUMENTS],
-        env=os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder)},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        bufsize=1,
-    )
 
 
 def _feed_process(

@@ -189,9 +189,14 @@ def read_autosave(
     )
     try:
         new_context, replaced = restore_settings(context, data, options)
-        restored_mission, restored_context = (
-            (mission, new_context) if replaced else _restore_plan(new_context, mission, data)
-        )
+        restored_mission, restored_context = mission, new_context
+        if data.get("plan") and not replaced:
+            new_scenario = new_context.scenario
+            plan = replace(parse_plan(data["plan"], "kept", ground=new_scenario.terrain), scenario=new_scenario)
+            plan_mission = planned_mission(plan, new_context.planning_uav(mission))
+            # The autosave contains all digits, so different items mean that the mission was changed after planning.
+            if plan_mission.items == mission.items:
+                restored_mission, restored_context = plan_mission, new_context.with_plan(plan, plan_mission)
         by_options = bool(replaced) and data.get("scenario") == _scenario_name(context)
         return Restored(restored_mission, restored_context, steps, undone_steps, replaced, by_options, unused_edits)
     except (*INTERNAL, PlanflyError) as error:
@@ -232,7 +237,13 @@ def restore_settings(
         return context, (f"all of them, which belong to {scenario_name or 'the mission without a scenario'}",)
     spec, saved = json.loads(json.dumps(scenario.to_json())), data.get("settings", {})
     new_spec = spec | {table: dict(value) for table, value in saved.items() if table in _SAVED_TABLES}
-    replaced = _apply_options(new_spec, spec, options)
+    replaced: list[str] = []
+    for option, (table, keys) in _OPTION_ENTRIES.items():
+        if options.get(option) is not None:
+            aircraft = new_spec.setdefault(table, {}).get("aircraft"), spec.get(table, {}).get("aircraft")
+            if option == "aircraft" and not _is_same_value(*aircraft):
+                keys = (*keys, *_AIRCRAFT_KEYS)
+            replaced += _replace_entries(new_spec, spec, table, keys)
     flight = spec.get("flight", {})
     is_other_autopilot = flight.get("autopilot") != new_spec.get("flight", {}).get("autopilot")
     if file_autopilot and "autopilot_from" in flight and is_other_autopilot:
@@ -257,22 +268,6 @@ def restore_settings(
         )
     is_planned = new_context.planned or not data.get("planned")
     return new_context if is_planned else replace(new_context, planned=True), tuple(replaced)
-
-
-def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions) -> list[str]:
-    """Replace the entries of a saved scenario that options set by the entries of the opened scenario.
-
-    Returns a text with both values for each entry that was different.
-    """
-    replaced: list[str] = []
-    for option, (table, keys) in _OPTION_ENTRIES.items():
-        if options.get(option) is None:
-            continue
-        saved, opened = saved_spec.setdefault(table, {}), opened_spec.get(table, {})
-        if option == "aircraft" and not _is_same_value(saved.get("aircraft"), opened.get("aircraft")):
-            keys = (*keys, *_AIRCRAFT_KEYS)
-        replaced += _replace_entries(saved_spec, opened_spec, table, keys)
-    return replaced
 
 
 def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
@@ -304,21 +299,6 @@ def _is_same_value(first: object, second: object) -> bool:
 def _value_text(value: object) -> str:
     """Return a value of a scenario as text; a path is reduced to its name."""
     return "none" if value is None else Path(value).name if isinstance(value, str) else f"{value:g}"
-
-
-def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[Mission, EditContext]:
-    """Return a mission and its editing context; add the saved plan if it is the plan of this mission."""
-    if not data.get("plan"):
-        return mission, context
-    plan = parse_plan(data["plan"], "kept", ground=context.scenario.terrain)
-    plan = replace(plan, scenario=context.scenario)
-    mission_of_saved_plan = planned_mission(plan, context.planning_uav(mission))
-    # The autosave contains all digits, so different items mean that the mission was changed after planning.
-    return (
-        (mission_of_saved_plan, context.with_plan(plan, mission_of_saved_plan))
-        if mission_of_saved_plan.items == mission.items
-        else (mission, context)
-    )
 
 
 def mission_data(mission: Mission) -> Json:

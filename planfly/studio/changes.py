@@ -210,7 +210,16 @@ def describe_changes(previous: FlightResults | None, current: FlightResults) -> 
     """
     if previous is None:
         return []
-    old_results = _renumber(previous, current)
+    # Key the previous results by the positions of their items in the current mission.  Results at a removed item get a
+    # key that matches no current result.
+    new_positions, old_results = match_items(previous.items, current.items), _Results()
+    for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
+        if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
+            first = new_positions.get(first, _REMOVED_POSITION)
+            last = new_positions.get(last, _REMOVED_POSITION)
+            if _REMOVED_POSITION in (first, last):
+                kind, first, last = _REMOVED_PLACE, number, _REMOVED_POSITION
+        old_results[rule, (kind, first, last)] = result
     lines = _state_changes(old_results, current.results)
     if len(lines) > _MAX_STATE_CHANGES:
         lines[_MAX_STATE_CHANGES:] = [f"and {len(lines) - _MAX_STATE_CHANGES} more"]
@@ -228,22 +237,6 @@ _ITEM_PLACE_KINDS = ("leg", "waypoint", "mission")
 _REMOVED_PLACE = "gone"
 # Position of a removed item.
 _REMOVED_POSITION = -1
-
-
-def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
-    """Return the previous results, keyed by the positions of their items in the current mission.
-
-    Results at a removed item get a key that matches no current result.
-    """
-    new_positions, renumbered = match_items(previous.items, current.items), {}
-    for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
-        if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
-            first = new_positions.get(first, _REMOVED_POSITION)
-            last = new_positions.get(last, _REMOVED_POSITION)
-            if _REMOVED_POSITION in (first, last):
-                kind, first, last = _REMOVED_PLACE, number, _REMOVED_POSITION
-        renumbered[rule, (kind, first, last)] = result
-    return renumbered
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
@@ -289,21 +282,20 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
     level = next(
         (shown.level for shown in (result, old_result) if shown is not None and shown.ok is False), result.level
     )
-    values = dict.fromkeys(
-        text for shown in (old_result, result) if shown is not None and (text := _value_text(shown, level))
-    )
+    values: list[str] = []
+    for shown in (old_result, result):
+        if shown is None:
+            continue
+        text = shown.text if shown.level == level else ""
+        if shown.level != level and level == _PLANNED and shown.planned is not None:
+            text = quantity_text(shown.planned, shown.unit)
+        if text and text not in values:
+            values.append(text)
     values_text = " \u2192 ".join(values)
     name = _quantity_name(rule) if values else RULE_WORDS[rule].word
     was_flown = any(shown is not None and shown.planned is not None for shown in (old_result, result))
     planned_text = " planned" if values and level == _PLANNED and was_flown else ""
     return f"{result.place}: {name}{planned_text} {values_text}".rstrip() + f", {state_text}"
-
-
-def _value_text(result: PlaceResult, level: str) -> str:
-    """Return the value of a level with its unit, or "" if the place has none."""
-    if result.level != level and level == _PLANNED and result.planned is not None:
-        return quantity_text(result.planned, result.unit)
-    return result.text if result.level == level else ""
 
 
 def _quantity_name(rule: str) -> str:

@@ -37,12 +37,9 @@ class _UnknownConnection:
         self.number = next(_numbers)
         unknown = [connection for connection in self.connections if getattr(connection, "number", None) is not None]
         if len(unknown) > MAX_UNKNOWN_CONNECTIONS:
-            min(unknown, key=lambda connection: connection.number)._drop()
-
-    def _drop(self) -> None:
-        """Close the connection at once."""
-        self.number = None
-        self.transport.abort()
+            oldest = min(unknown, key=lambda connection: connection.number)
+            oldest.number = None
+            oldest.transport.abort()
 
 
 class ShortLivedHttpProtocol(_UnknownConnection, H11Protocol):

@@ -22,7 +22,6 @@ from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, load_scenario_with_options
 from planfly.studio.edit_context import EditContext
 from planfly.studio.settings import changed_settings, settings_json
-from planfly.workflow.imported_flights import ImportedFlight
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.workflow.uav import Uav, choose_seed, load_uav, uav_of_setup
@@ -95,9 +94,32 @@ def open_document(target: str, options: MissionOptions) -> Document:
     Raises PlanflyError if the target cannot be opened.
     """
     if target in embedded_names() or target.lower().endswith(".toml"):
-        return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
+        # The mission is a straight line until a path is planned.
+        scenario = load_scenario_with_options(target, options)
+        uav, seed = load_uav(scenario), choose_seed(scenario, options.get("seed"))
+        mission = planned_mission(straight_plan(scenario, seed), uav)
+        return Document(scenario.name, scenario.name, make_setup(scenario, uav, mission, seed), to_plan=True)
     path = Path(target)
-    setup = _open_file(path, options)
+    if path.is_file() and is_imported_log(path):
+        world: LogOptions = {
+            "scenario": options.get("scenario"),
+            "terrain": options.get("terrain"),
+            "fence": options.get("fence") or (),
+        }
+        try:
+            setup = read_imported(path, **world).setup
+        except LogError as error:
+            has_track = "contains no mission" in str(error)
+            if not has_track and path.suffix.lower() not in MAP_SUFFIXES:
+                raise
+            reason = f"contains {'a track' if has_track else 'a map'} but no mission: open the mission file instead"
+            raise MissionError(f"{path}: {reason}", file=path) from None
+        setup = _log_mission_setup(setup.scenario, setup.mission, setup.seed)
+    elif path.is_file() and is_log(path):
+        setup = read_log(path).setup
+        setup = _log_mission_setup(apply_options(setup.scenario, options), setup.mission, setup.seed)
+    else:
+        setup = open_flight(path, options)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
     kind = "waypoints" if path.suffix.lower() == ".txt" else "" if kind == "kml" else kind
     data = path.read_bytes() if kind else b""
@@ -127,28 +149,22 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
         file = folder / f"dropped{suffix}"
         file.write_bytes(data)
         if data.startswith(MCAP_MAGIC):
-            _check_log_names_no_files(shown_name, file)
+            # A log may name files in its scenario, or in the scenario of its plan.
+            container = Container()
+            with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
+                stream.seek(len(MAGIC))
+                # Errors in the log are reported when the log is read; only the attachments before an error are checked.
+                for _ in read_chunks(stream, container):
+                    pass
+            attachments = container.attachments
+            if SCENARIO_FILE in attachments:
+                _check_plan_names_no_files(shown_name, b'{"scenario": ' + attachments[SCENARIO_FILE] + b"}")
+            _check_plan_names_no_files(shown_name, attachments.get(PLAN_FILE, b""))
         try:
             document = open_document(str(file), options)
         except PlanflyError as error:
             raise PlanflyError(str(error).replace(str(file), shown_name), file=shown_name) from None
     return replace(document, name=shown_name, stem=Path(shown_name).stem, path=None)
-
-
-def _check_log_names_no_files(name: str, file: Path) -> None:
-    """Raise PlanflyError if a log names files of this machine.
-
-    Such a name may be in its scenario or in the scenario of its plan.
-    """
-    container = Container()
-    with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
-        stream.seek(len(MAGIC))
-        # Errors in the log are reported when the log is read; only the attachments before an error are checked.
-        for _ in read_chunks(stream, container):
-            pass
-    if SCENARIO_FILE in container.attachments:
-        _check_plan_names_no_files(name, b'{"scenario": ' + container.attachments[SCENARIO_FILE] + b"}")
-    _check_plan_names_no_files(name, container.attachments.get(PLAN_FILE, b""))
 
 
 def _check_plan_names_no_files(name: str, data: bytes) -> None:
@@ -172,48 +188,9 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
             raise MissionError.at(name, "scenario", str(file)[:60], allowed)
 
 
-def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
-    """Return the flight setup of a plan file, a mission file, or the mission in a log."""
-    if path.is_file() and is_imported_log(path):
-        setup = _read_imported_log(path, options).setup
-        return _log_mission_setup(setup.scenario, setup.mission, setup.seed)
-    if path.is_file() and is_log(path):
-        setup = read_log(path).setup
-        return _log_mission_setup(apply_options(setup.scenario, options), setup.mission, setup.seed)
-    return open_flight(path, options)
-
-
-def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
-    """Read a log of another program.
-
-    Raises PlanflyError for a log that cannot be read, and MissionError for a log without a mission.
-    """
-    world: LogOptions = {
-        "scenario": options.get("scenario"),
-        "terrain": options.get("terrain"),
-        "fence": options.get("fence") or (),
-    }
-    try:
-        return read_imported(path, **world)
-    except LogError as error:
-        has_track = "contains no mission" in str(error)
-        if not has_track and path.suffix.lower() not in MAP_SUFFIXES:
-            raise
-        reason = f"contains {'a track' if has_track else 'a map'} but no mission: open the mission file instead"
-        raise MissionError(f"{path}: {reason}", file=path) from None
-
-
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
     """Return the flight setup of the mission in a log, with the UAV of `scenario`."""
     return make_setup(scenario, load_uav(scenario), mission, seed)
-
-
-def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
-    """Make a document for a scenario; its mission is a straight line until a path is planned."""
-    uav, chosen_seed = load_uav(scenario), choose_seed(scenario, seed)
-    mission = planned_mission(straight_plan(scenario, chosen_seed), uav)
-    setup = make_setup(scenario, uav, mission, chosen_seed)
-    return Document(scenario.name, scenario.name, setup, to_plan=True)
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
@@ -261,7 +238,17 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
     if kind == document.kind and mission is document.setup.mission and has_same_world:
         return SavedFile(name, document.data, _lost_settings(document.setup, context))
     if kind == "plan.json":
-        return _saved_plan(name, context, judged_mission)
+        # A plan whose certificate still applies is saved as it is; a new plan is certified.
+        if (plan := judged_mission.setup.plan) is not None:
+            return SavedFile(name, plan_json(plan).encode())
+        plan = make_certified_plan(context, judged_mission)
+        keeps_items = context.planned and planned_mission(plan, context.uav).items == mission.items
+        plan_losses = [] if keeps_items else ["the items, because a plan stores only positions"]
+        if plan.failures:
+            plan_losses.append(f"the plan is not feasible: {plan.failures[0]}")
+        elif plan.unmet_margins:
+            plan_losses.append(f"planner's margins not met: {plan.unmet_margins[0]}")
+        return SavedFile(name, plan_json(plan).encode(), (*plan_losses, *_lost_parameters(context)))
     if kind == "kml":
         text = kml_text(context.scenario.name, [plan_line(judged_mission.setup)], map_zones(judged_mission.setup))
         data = text.encode() if isinstance(text, str) else text
@@ -327,45 +314,6 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
     return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
 
 
-def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) -> SavedFile:
-    """Return the mission as a plan of its scenario, with the current certificate of its path.
-
-    A plan whose certificate still applies is returned as it is. A new plan is certified; the losses say what it does
-    not keep of the mission, and why it is not feasible.
-    """
-    plan = judged_mission.setup.plan
-    if plan is not None:
-        return SavedFile(name, plan_json(plan).encode())
-    new_plan = make_certified_plan(context, judged_mission)
-    has_changed_items = (
-        not context.planned or planned_mission(new_plan, context.uav).items != judged_mission.mission.items
-    )
-    losses = ["the items, because a plan stores only positions"] if has_changed_items else []
-    if new_plan.failures:
-        losses.append(f"the plan is not feasible: {new_plan.failures[0]}")
-    elif new_plan.unmet_margins:
-        losses.append(f"planner's margins not met: {new_plan.unmet_margins[0]}")
-    return SavedFile(name, plan_json(new_plan).encode(), (*losses, *_lost_parameters(context)))
-
-
-def _check_plain_waypoints(mission: Mission) -> None:
-    """Raise MissionError for the first item that a plan cannot store.
-
-    A plan cannot store a take-off, a landing, or a change of speed along the path.
-    """
-    first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
-    for index, item in enumerate(mission.items):
-        lost_content = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
-        if item.command == Command.DO_CHANGE_SPEED and index > first:
-            lost_content = "a change of speed along its path"
-        if lost_content:
-            reason = (
-                f"a plan.json of edited waypoints cannot contain {lost_content} (item {item.seq}):"
-                " save a .plan, or plan again"
-            )
-            raise MissionError(f"{mission.source}: {reason}", file=mission.source, field=f"item {item.seq}")
-
-
 def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> Plan:
     """Make a plan from the waypoints of an edited route, certified like the planner's plans.
 
@@ -391,7 +339,18 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
         )
     if (plan := _plan_with_ground_phases(context, mission)) is not None:
         return plan
-    _check_plain_waypoints(mission)
+    # A plan cannot store a take-off, a landing, or a change of speed along the path.
+    first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
+    for index, item in enumerate(mission.items):
+        lost_content = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
+        if item.command == Command.DO_CHANGE_SPEED and index > first:
+            lost_content = "a change of speed along its path"
+        if lost_content:
+            reason = (
+                f"a plan.json of edited waypoints cannot contain {lost_content} (item {item.seq}):"
+                " save a .plan, or plan again"
+            )
+            raise MissionError(f"{name}: {reason}", file=name, field=f"item {item.seq}")
     return _certified_plan(context, np.array(route.positions)[route.items >= 0])
 
 

@@ -68,10 +68,25 @@ def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> b
         return _to_webp(picture)
     min_height, max_height = float(heights[is_known].min()), float(heights[is_known].max())
     pixel_size = (north[1] - north[0]) / (heights.shape[0] - 1)
-    picture = _tint_by_height(heights, min_height, max(max_height, min_height + 1.0), dark=dark)
+    # The colour of each altitude, in a palette that extends over the heights of the map, at least over 1 m.
+    ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
+    fraction = (heights - min_height) / (max(max_height, min_height + 1.0) - min_height)
+    ramp_position = np.nan_to_num(fraction) * (len(ramp) - 1)
+    picture = np.stack([np.interp(ramp_position, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
     if max_height - min_height >= 1.0:
         picture *= relief(heights, pixel_size, max_height - min_height)[..., None]
-        picture = _draw_contours(picture, heights, nice_step(max_height - min_height, _MAX_CONTOURS), dark=dark)
+        # Contours, every fifth contour bold.
+        step = nice_step(max_height - min_height, _MAX_CONTOURS)
+        filled_heights = np.nan_to_num(heights, nan=float(np.nanmean(heights)))
+        slope = np.hypot(*np.gradient(filled_heights))
+        ink = np.array(theme.rgba("contour", dark=dark)[:3])
+        for spacing, half_width in ((step, 0.5), (step * _BOLD_STRIDE, 0.8)):
+            level = filled_heights / spacing
+            pixel_distance = np.abs(level - np.round(level)) * spacing / np.maximum(slope, 1e-6)
+            # Draw no contour on flat ground, even if its height is near a level.
+            coverage = np.clip(half_width + 0.5 - pixel_distance, 0.0, 1.0) * np.clip(slope / (0.02 * step), 0.0, 1.0)
+            opacity = (_CONTOUR_OPACITY * coverage)[..., None]
+            picture = picture * (1.0 - opacity) + ink * opacity
     picture[~is_known] = unknown
     return _to_webp(picture)
 
@@ -85,36 +100,6 @@ def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) ->
     longer_side = max(width, height)
     columns, rows = (max(2, round(pixels * length / longer_side)) for length in (width, height))
     return np.asarray(terrain.height(np.linspace(*east, columns)[None, :], np.linspace(*north, rows)[:, None]))
-
-
-def _tint_by_height(heights: Floats, min_height: float, max_height: float, *, dark: bool) -> Floats:
-    """Return the colour for each altitude (rows, columns, 3): red, green and blue from 0 to 1.
-
-    heights: altitudes, (rows, columns), m; the palette extends from `min_height` to `max_height`.
-    """
-    ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
-    ramp_position = np.nan_to_num((heights - min_height) / (max_height - min_height)) * (len(ramp) - 1)
-    return np.stack([np.interp(ramp_position, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
-
-
-def _draw_contours(picture: Floats, heights: Floats, step: float, *, dark: bool) -> Floats:
-    """Return the picture (rows, columns, 3) with contours drawn over it, every fifth contour bold.
-
-    heights: altitudes of the pixels (rows, columns), m AMSL.
-    step: altitude between two contours, m.
-    """
-    filled_heights = np.nan_to_num(heights, nan=float(np.nanmean(heights)))
-    slope = np.hypot(*np.gradient(filled_heights))
-    ink = np.array(theme.rgba("contour", dark=dark)[:3])
-    for spacing, half_width, strength in ((step, 0.5, _CONTOUR_OPACITY), (step * _BOLD_STRIDE, 0.8, _CONTOUR_OPACITY)):
-        pixel_distance = (
-            np.abs(filled_heights / spacing - np.round(filled_heights / spacing)) * spacing / np.maximum(slope, 1e-6)
-        )
-        # Draw no contour on flat ground, even if its height is near a level.
-        coverage = np.clip(half_width + 0.5 - pixel_distance, 0.0, 1.0) * np.clip(slope / (0.02 * step), 0.0, 1.0)
-        opacity = (strength * coverage)[..., None]
-        picture = picture * (1.0 - opacity) + ink * opacity
-    return picture
 
 
 def _to_webp(picture: Floats) -> bytes:

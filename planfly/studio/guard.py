@@ -60,23 +60,15 @@ def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
         name in _BODY_HEADERS and value != "0" for name, value in headers
     ):
         return 405, "only GET and HEAD without a body are answered"
-    if sites and sites != ["same-origin"] and sites != ["none"] and not _is_page_visit(scope, headers):
-        return 403, "requests from another page are refused"
-    return 0, ""
-
-
-def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Return True if a browser opens the page itself.
-
-    This is allowed from any site, because the page has no data without a token.
-
-    headers: names and values of the request's headers, in lower case.
-    """
+    # A browser may open the page itself from any site, because the page has no data without a token.
     header_values = dict(headers)
     is_document = (
         header_values.get(b"sec-fetch-mode") == "navigate" and header_values.get(b"sec-fetch-dest") == "document"
     )
-    return scope["path"] == "/" and is_document
+    is_page_visit = scope["path"] == "/" and is_document
+    if sites and sites != ["same-origin"] and sites != ["none"] and not is_page_visit:
+        return 403, "requests from another page are refused"
+    return 0, ""
 
 
 class Guard:

@@ -4,7 +4,6 @@ The judged part of the route covers all legs and corners that a move can change,
 there. Requirements on the whole flight, such as energy, stall and bounds, are judged only with the whole route.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,8 +100,9 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
     """
     altitudes, wind = route.positions[:, 2], context.scenario.wind
     leg_altitudes = 0.5 * (altitudes[1:] + altitudes[:-1])
+    speeds = context.uav.autopilot.speeds
     true_airspeed = route.leg_airspeeds * np.array(
-        [_speed_factor(context, float(altitude)) for altitude in leg_altitudes]
+        [speeds.true_airspeed_factor(altitude) if speeds.equivalent else 1.0 for altitude in leg_altitudes.tolist()]
     )
     legs = list(dict.fromkeys([int(np.argmax(route.leg_airspeeds)), int(np.argmax(true_airspeed))]))
     windiest_altitude = float(
@@ -132,12 +132,6 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
     return replace(part, points=points), count if before_part else 0
 
 
-def _speed_factor(context: EditContext, altitude: float) -> float:
-    """Return the ratio of true airspeed to commanded airspeed at an altitude, m AMSL."""
-    autopilot = context.uav.autopilot
-    return autopilot.speeds.true_airspeed_factor(altitude) if autopilot.speeds.equivalent else 1.0
-
-
 def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Window:
     """Judge the legs and corners between the waypoints `first` and `last` of a route.
 
@@ -145,25 +139,19 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
     start: number of the part's first waypoint in the whole route.
     """
     requirements = replace(route_requirements(setup), zone_check_legs=(first - start, last - start - 1))
-    findings = tuple(
-        finding
-        for finding in run_rules(requirements, None, geometric=True, includes_whole_flight=False)
-        if _is_in_window(finding, first - start, last - start)
-    )
-    return Window(first, last, start, requirements, findings)
-
-
-def _is_in_window(finding: Finding, first: int, last: int) -> bool:
-    """Return True if a finding is on a leg or corner between two waypoints, or on any violated threat or zone.
-
-    first, last: numbers of the two waypoints in the judged part of the route.
-    """
-    place = finding.place
-    if finding.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
-        return True
-    if place.index is None or place.kind not in ("leg", "waypoint"):
-        return False
-    return first <= place.index < last + (place.kind == "waypoint")
+    findings = []
+    for finding in run_rules(requirements, None, geometric=True, includes_whole_flight=False):
+        # Findings on a leg or corner of the window, or on any violated threat or zone.
+        place = finding.place
+        is_violation = finding.ok is False and place.kind in ("missile", "exclusion", "inclusion")
+        is_in_window = (
+            place.kind in ("leg", "waypoint")
+            and place.index is not None
+            and first <= place.index + start < last + (place.kind == "waypoint")
+        )
+        if is_violation or is_in_window:
+            findings.append(finding)
+    return Window(first, last, start, requirements, tuple(findings))
 
 
 def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
@@ -178,19 +166,14 @@ def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None
     if not len(rows) or route.rtl_start is not None or route.direct_landing_start is not None:
         return None
     spans: list[tuple[int, int]] = []
-    for first, last in _consecutive_runs(rows):
-        span = _extend_span(route, first, last)
+    # Each run of consecutive waypoints is one span.
+    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+        span = _extend_span(route, int(run[0]), int(run[-1]))
         if spans and span[0] <= spans[-1][1] + 2 * MOVE_REACH_LEGS:
             span = spans.pop()[0], span[1]
         spans.append(span)
     judged_legs = sum(last - first + 2 * MOVE_REACH_LEGS for first, last in spans)
     return None if len(spans) > _MAX_PASSES or judged_legs >= route.legs else spans
-
-
-def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield the first and the last number of each run of consecutive numbers."""
-    for group in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
-        yield int(group[0]), int(group[-1])
 
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:

@@ -326,33 +326,26 @@ def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
     }
     # Quantities that are equal for all paths, or unknown, do not help to choose.
     differing_quantities = {name: values for name, values in quantities.items() if max(values) > min(values)}
-    return [
-        _path_json(plan)
-        | {"best": [name for name, values in differing_quantities.items() if values[index] == min(values)]}
-        for index, plan in enumerate(plans)
-    ]
-
-
-def _path_json(front_plan: FrontPlan) -> Json:
-    """Return page data of a planned path.
-
-    The data include length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh).
-    """
-    plan, (length, exposure, clearance, seconds, energy) = (
-        front_plan.plan,
-        round_to_json(
+    paths_data = []
+    for index, front_plan in enumerate(plans):
+        plan = front_plan.plan
+        # m, s, m, s and Wh.
+        length, exposure, clearance, seconds, energy = round_to_json(
             [front_plan.length, front_plan.exposure, front_plan.clearance, front_plan.time, front_plan.energy / 3600.0]
-        ),
-    )
-    return {
-        "seed": plan.seed,
-        "algorithm": plan.algorithm,
-        "state": plan.state,
-        "length": length,
-        "exposure": exposure,
-        "clearance": clearance,
-        "seconds": seconds,
-        "energy": energy,
-        "problems": list(plan.certificate.problems[:2]),
-        "points": round_to_json(plan.waypoints),
-    }
+        )
+        paths_data.append(
+            {
+                "seed": plan.seed,
+                "algorithm": plan.algorithm,
+                "state": plan.state,
+                "length": length,
+                "exposure": exposure,
+                "clearance": clearance,
+                "seconds": seconds,
+                "energy": energy,
+                "problems": list(plan.certificate.problems[:2]),
+                "points": round_to_json(plan.waypoints),
+                "best": [name for name, values in differing_quantities.items() if values[index] == min(values)],
+            }
+        )
+    return paths_data

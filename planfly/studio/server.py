@@ -17,7 +17,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -192,18 +192,14 @@ class Server:
 
     async def _handle_messages(self, page: Page) -> None:
         """Send the initial messages to a page, then handle its messages until it disconnects."""
-        await self._send_initial_messages(page)
+        page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
+        page.send(self.session.world_message())
+        for message in (*self.jobs.progress_messages(), self._mission_message_for_page(), *self.jobs.result_messages()):
+            page.send(message)
+        await self._send_ground(page)
         while True:
             await self._handle_message(page, await _receive_text(page.socket))
             await asyncio.sleep(MESSAGE_PAUSE_S)
-
-    async def _wait_for_free_slot(self) -> None:
-        """Wait until fewer than `MAX_PAGES` pages are connected.
-
-        The server polls, because pages may disconnect without notice.
-        """
-        while len(self._pages) >= MAX_PAGES:
-            await asyncio.sleep(_SLOT_CHECK_INTERVAL_S)
 
     async def _authenticate(self, socket: WebSocket) -> Page | None:
         """Return the page if its first message has the token; otherwise close the websocket and return None.
@@ -222,8 +218,11 @@ class Server:
             if has_token and isinstance(message, messages.Hello):
                 socket.scope.get(ALLOW_FULL_SIZE, lambda: None)()
                 code = TOO_MANY
-                # A page that has gone occupies a slot until the server notices this, which may take some time.
-                await asyncio.wait_for(self._wait_for_free_slot(), TOKEN_TIMEOUT_S)
+                # A page that has gone occupies a slot until the server notices this, which may take some time. The
+                # server polls, because pages may disconnect without notice.
+                async with asyncio.timeout(TOKEN_TIMEOUT_S):
+                    while len(self._pages) >= MAX_PAGES:
+                        await asyncio.sleep(_SLOT_CHECK_INTERVAL_S)
                 return Page(socket, message.dark)
         with contextlib.suppress(RuntimeError):
             await socket.close(code)
@@ -260,14 +259,6 @@ class Server:
             page.send({"kind": "preview", "rev": drag.rev, "n": drag.n, "k": drag.k, **result})
             # Let the answer be sent before the next position is judged, which keeps the interpreter busy.
             await asyncio.sleep(_SEND_PAUSE_S)
-
-    async def _send_initial_messages(self, page: Page) -> None:
-        """Send choices, world, mission, tasks, results and terrain to a page that has just connected."""
-        page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
-        page.send(self.session.world_message())
-        for message in (*self.jobs.progress_messages(), self._mission_message_for_page(), *self.jobs.result_messages()):
-            page.send(message)
-        await self._send_ground(page)
 
     def _mission_message_for_page(self) -> Json:
         """Return the message with the mission; "planning" is true while its first path is being planned."""
@@ -324,8 +315,33 @@ class Server:
             page.dark = message.dark
             await self._send_ground(page)
             return
+        session = self.session
         try:
-            await self._dispatch(page, message)
+            match message:
+                case messages.Ask(kind="stop"):
+                    self.jobs.stop()
+                case messages.Ask() | messages.Plan():
+                    if isinstance(message, messages.Plan):
+                        self.jobs.plan(message, session)
+                    else:
+                        self.jobs.start_task(message.kind, session)
+                    # A process that starts for the task takes seconds to report progress.
+                    for progress_message in self.jobs.progress_messages():
+                        self._broadcast(progress_message)
+                case messages.Save():
+                    save_mission = session.overwrite_file if message.over else lambda: session.save(message.form)
+                    async with self._change_lock:
+                        saved = await self._run_judging(save_mission)
+                    content = "" if message.over else base64.b64encode(saved.data).decode()
+                    path = session.document.path
+                    folder = home_relative_text(path.parent) if message.over and path else ""
+                    answer = {"name": saved.name, "losses": list(saved.losses), "where": folder, "data": content}
+                    page.send({"kind": "saved", **answer})
+                    self._broadcast({"kind": "unsaved", "unsaved": session.is_unsaved})
+                case messages.Hello():
+                    raise ValueError("a page must send its token only once")
+                case _:
+                    await self._change_session(message)
         except StaleEdit:
             page.send({"kind": "stale"})
             page.send(self._mission_message_for_page())
@@ -333,39 +349,6 @@ class Server:
             page.send({"kind": "fault", "text": str(error)})
         except INTERNAL as error:
             page.send({"kind": "fault", "text": internal_text(error)})
-
-    async def _dispatch(self, page: Page, message: messages.Message) -> None:
-        """Perform the action that a message from a page requests.
-
-        Raises StaleEdit if the page edited an outdated mission, and PlanflyError if the action fails.
-        """
-        session = self.session
-        match message:
-            case messages.Ask(kind="stop"):
-                self.jobs.stop()
-            case messages.Ask() | messages.Plan():
-                if isinstance(message, messages.Plan):
-                    self.jobs.plan(message, session)
-                else:
-                    self.jobs.start_task(message.kind, session)
-                # A process that starts for the task takes seconds to report progress.
-                for progress_message in self.jobs.progress_messages():
-                    self._broadcast(progress_message)
-            case messages.Save():
-                save_mission = session.overwrite_file if message.over else lambda: session.save(message.form)
-                async with self._change_lock:
-                    saved = await self._run_judging(save_mission)
-                content = "" if message.over else base64.b64encode(saved.data).decode()
-                folder = (
-                    home_relative_text(session.document.path.parent) if message.over and session.document.path else ""
-                )
-                answer = {"name": saved.name, "losses": list(saved.losses), "where": folder, "data": content}
-                page.send({"kind": "saved", **answer})
-                self._broadcast({"kind": "unsaved", "unsaved": session.is_unsaved})
-            case messages.Hello():
-                raise ValueError("a page must send its token only once")
-            case _:
-                await self._change_session(message)
 
     async def _change_session(self, message: messages.Message) -> None:
         """Change the session as a message requests, send the result to every page, and start a flight.
@@ -407,32 +390,29 @@ class Server:
             case messages.Choose():
                 session.replace_plan(message)
             case messages.Open() if message.data is None and message.name.lower().endswith(PARAMETER_FILES):
-                session.change_settings(self._read_parameter_file(message.name))
+                path = find_file_in_folder(self._folder, message.name)
+                data = read_small_file(path, messages.MAX_MESSAGE_CHARACTERS, "parameter", PlanflyError)
+                text = utf8_text(data, path, PlanflyError)
+                session.change_settings(
+                    messages.Settings(kind="settings", parameter_file=path.name, parameter_text=text)
+                )
             case messages.Open():
-                document = self._open_file(message)
+                if message.data is None:
+                    document = open_document(str(find_file_in_folder(self._folder, message.name)), session.options)
+                else:
+                    # A dropped file.
+                    try:
+                        data = base64.b64decode(message.data, validate=True)
+                    except binascii.Error as error:
+                        text = f"{message.name[:60]}: the file was not received completely"
+                        raise MissionError(text, field="data") from error
+                    document = open_dropped(message.name, data, session.options)
                 if self._autosave_file is not None and session.needs_autosave:
                     # An error here is reported at the next regular autosave.
                     with contextlib.suppress(OSError, PlanflyError):
                         session.autosave(self._autosave_file)
                 session.open(document, self._autosave_file)
                 self.jobs.discard_results()
-
-    def _open_file(self, message: messages.Open) -> Any:
-        """Return the document of a dropped file, or of a file in the folder if the message has no data."""
-        if message.data is None:
-            return open_document(str(find_file_in_folder(self._folder, message.name)), self.session.options)
-        try:
-            data = base64.b64decode(message.data, validate=True)
-        except binascii.Error as error:
-            raise MissionError(f"{message.name[:60]}: the file was not received completely", field="data") from error
-        return open_dropped(message.name, data, self.session.options)
-
-    def _read_parameter_file(self, name: str) -> messages.Settings:
-        """Read a parameter file of the folder, and return the message that changes the settings to it."""
-        path = find_file_in_folder(self._folder, name)
-        data = read_small_file(path, messages.MAX_MESSAGE_CHARACTERS, "parameter", PlanflyError)
-        text = utf8_text(data, path, PlanflyError)
-        return messages.Settings(kind="settings", parameter_file=path.name, parameter_text=text)
 
     # ------------------------------------------------------------------
     # Answers of the processes.

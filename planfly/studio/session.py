@@ -228,12 +228,65 @@ class Session:
         """
         if message.rev != self.rev:
             raise StaleEdit
-        mission, text = self._apply_edit(message)
-        values = suggested_parameters(self._tried_change(message)[1]) if isinstance(message, Apply) else {}
-        old_values = self.context.parameters.values
+        context, mission, values = self.context, self.mission, {}
+        match message:
+            case Move():
+                item = edits.movable_item(mission, message.k)
+                mission = self._move_item(message.k, message.east, message.north, message.up)
+                text = f"move item {item.seq}"
+            case Insert():
+                # The altitude is the mean of the previous and next item's altitudes if both have the same frame, and
+                # otherwise the previous item's altitude.
+                place_indices = edits.movable_indices(mission)
+                previous_item = edits.movable_item(mission, message.after)
+                altitude, position = None, place_indices.index(message.after)
+                if position + 1 < len(place_indices):
+                    next_item = mission.items[place_indices[position + 1]]
+                    has_same_frame = next_item.frame == previous_item.frame and next_item.command not in LANDINGS
+                    mean_altitude = 0.5 * (previous_item.alt + next_item.alt)
+                    altitude = mean_altitude if has_same_frame and np.isfinite(mean_altitude) else None
+                lat, lon = context.to_geographic(message.east, message.north)
+                new_mission = edits.insert_waypoint(mission, message.after, lat, lon, altitude)
+                mission = context.with_updated_radii(new_mission, edits.insertion_index(mission, message.after))
+                text = f"insert an item after {previous_item.seq}"
+            case Delete():
+                deleted_indices = set(message.ks)
+                for index in sorted(deleted_indices, reverse=True):
+                    mission = edits.delete_item(mission, index)
+                    place_indices = edits.movable_indices(mission)
+                    nearest_index = min(place_indices, key=lambda place_index: abs(place_index - index))
+                    mission = context.with_updated_radii(mission, nearest_index)
+                text = f"delete {count_text(len(deleted_indices), 'item')}"
+            case Raise():
+                # Landings are raised only if all of the items are landings.
+                requested = edits.movable_indices(mission) if message.ks is None else tuple(message.ks)
+                airborne = tuple(
+                    index for index in requested if edits.movable_item(mission, index).command not in LANDINGS
+                )
+                indices = airborne or requested
+                mission = edits.raise_items(mission, indices, message.by)
+                items_text = "all items" if message.ks is None else count_text(len(indices), "item")
+                text = f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
+            case Apply():
+                # The suggestion must have passed a trial on this revision.
+                tried = self.tried.get("flown" if message.flown else "geometric")
+                changes = tried.changes if tried and tried.rev == self.rev else {}
+                change = changes.get((message.finding, message.which))
+                if change is None:
+                    raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
+                changed_mission, suggestion = change
+                values = suggested_parameters(suggestion)
+                moves = item_moves(context, mission, changed_mission)
+                findings = self.judged.verdict.findings
+                source = "the flight" if message.flown else rule_word(findings[message.finding].rule)
+                is_move_only = moves and not values
+                edit_text = f"move {moves_text(moves)}" if is_move_only else suggestion_text(without_trial(suggestion))
+                text = f"apply a suggestion of {source}: {edit_text}"
+                mission = replace(changed_mission, autopilot=mission.autopilot)
+        old_values = context.parameters.values
         self._set_mission(mission, self._context_with_parameters(values))
-        changes = (ParameterChange(name, old_values.get(name), value) for name, value in values.items())
-        self._add_to_history(mission, text, tuple(changes))
+        parameter_changes = (ParameterChange(name, old_values.get(name), value) for name, value in values.items())
+        self._add_to_history(mission, text, tuple(parameter_changes))
 
     def _context_with_parameters(self, values: Mapping[str, float | None]) -> EditContext:
         """Return the editing context with other values of the parameters that the autopilot has, by name.
@@ -251,9 +304,16 @@ class Session:
         """Undo, redo, or revert to the mission in the file; do nothing if there is nothing to undo, redo or revert.
 
         kind: "undo", "redo" or "revert".
+
+        Raises PlanflyError if the file to revert to has changed and cannot be read.
         """
         if kind == "revert":
-            self._read_changed_file()
+            # The mission of a file that another program has changed becomes the saved mission.
+            path = self.document.path
+            if path and self.file_kind and not (path.exists() and path.read_bytes() == self.document.on_disk):
+                changed_document = open_document(str(path), self.options)
+                self.history.saved = changed_document.setup.mission
+                self.document = replace(self.document, on_disk=changed_document.on_disk)
             if self.is_unsaved:
                 self._set_mission(self.history.saved)
                 self._add_to_history(self.history.saved, "revert to the file")
@@ -278,18 +338,6 @@ class Session:
         except Exception:
             self.history.position = previous_position
             raise
-
-    def _read_changed_file(self) -> None:
-        """Read the mission file again if another program has changed it; its mission becomes the saved mission.
-
-        Raises PlanflyError if the file cannot be read.
-        """
-        path = self.document.path
-        if path is None or not self.file_kind or (path.exists() and path.read_bytes() == self.document.on_disk):
-            return
-        changed_document = open_document(str(path), self.options)
-        self.history.saved = changed_document.setup.mission
-        self.document = replace(self.document, on_disk=changed_document.on_disk)
 
     def judge_drag(self, message: Drag) -> Json:
         """Judge the mission with an item dragged to another position, without changing the mission.
@@ -319,7 +367,22 @@ class Session:
         if item_range is None:
             self._show_plan(plan)
             return
-        mission = self._replace_items_between(plan, *item_range)
+        first, last = item_range
+        mission = self.mission
+        for index in [index for index in edits.movable_indices(mission) if first < index < last][::-1]:
+            mission = edits.delete_item(mission, index)
+        new_waypoints = plan.waypoints[1:-1]
+        lats, lons = to_geo(self.context.scenario.origin, new_waypoints[:, 0], new_waypoints[:, 1])
+        inserted_index = first
+        for lat, lon, altitude in zip(lats.tolist(), lons.tolist(), new_waypoints[:, 2].tolist(), strict=True):
+            previous_index, inserted_index = inserted_index, edits.insertion_index(mission, inserted_index)
+            mission = edits.insert_waypoint(mission, previous_index, lat, lon)
+            position = edits.movable_indices(mission).index(inserted_index)
+            current_altitude = float(self.context.item_positions(mission)[position, 2])
+            mission = edits.set_altitude(mission, inserted_index, altitude, current_altitude)
+        place_indices = edits.movable_indices(mission)
+        for index in place_indices[place_indices.index(first) : place_indices.index(inserted_index) + 2]:
+            mission = self.context.with_updated_radii(mission, index)
         self._set_mission(mission)
         self._add_to_history(mission, "plan a part")
 
@@ -345,36 +408,6 @@ class Session:
         self._set_mission(mission, self.context.with_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
 
-    def _apply_edit(self, message: Edit) -> tuple[Mission, str]:
-        """Return the edited mission and a description of the edit."""
-        match message:
-            case Move():
-                item = edits.movable_item(self.mission, message.k)
-                mission = self._move_item(message.k, message.east, message.north, message.up)
-                return mission, f"move item {item.seq}"
-            case Insert():
-                return self._insert_waypoint(message)
-            case Delete():
-                return self._delete_items(message.ks)
-            case Raise():
-                indices = self._indices_to_raise(message.ks)
-                mission = edits.raise_items(self.mission, indices, message.by)
-                items_text = "all items" if message.ks is None else count_text(len(indices), "item")
-                return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
-            case Apply():
-                return self._mission_with_suggestion(message)
-
-    def _indices_to_raise(self, indices: list[int] | None) -> tuple[int, ...]:
-        """Return the indices of the items to raise, without landings unless all of them are landings.
-
-        indices: requested items; None for all items with a position.
-        """
-        requested = edits.movable_indices(self.mission) if indices is None else tuple(indices)
-        airborne = tuple(
-            index for index in requested if edits.movable_item(self.mission, index).command not in LANDINGS
-        )
-        return airborne or requested
-
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
         """Return the mission with an item moved to a position, m, or altitude, m AMSL.
 
@@ -392,87 +425,6 @@ class Session:
                 mission, index, altitude, current_altitude if np.isfinite(current_altitude) else altitude
             )
         return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
-
-    def _insert_waypoint(self, message: Insert) -> tuple[Mission, str]:
-        """Return the mission with a waypoint inserted, and a description of the edit.
-
-        The waypoint's altitude is the mean of the previous and next item's altitudes if both have the same frame, and
-        otherwise the previous item's altitude.
-        """
-        mission, place_indices = self.mission, edits.movable_indices(self.mission)
-        previous_item = edits.movable_item(mission, message.after)
-        altitude, position = None, place_indices.index(message.after)
-        if position + 1 < len(place_indices):
-            next_item = mission.items[place_indices[position + 1]]
-            has_same_frame = next_item.frame == previous_item.frame and next_item.command not in LANDINGS
-            altitude = 0.5 * (previous_item.alt + next_item.alt) if has_same_frame else None
-            altitude = altitude if altitude is not None and np.isfinite(altitude) else None
-        new_mission = edits.insert_waypoint(
-            mission, message.after, *self.context.to_geographic(message.east, message.north), altitude
-        )
-        return self.context.with_updated_radii(
-            new_mission, edits.insertion_index(mission, message.after)
-        ), f"insert an item after {previous_item.seq}"
-
-    def _delete_items(self, indices: list[int]) -> tuple[Mission, str]:
-        """Return the mission without some items, and a description of the edit.
-
-        indices: indices in the mission's list of items.
-        """
-        mission = self.mission
-        for index in sorted(set(indices), reverse=True):
-            mission = edits.delete_item(mission, index)
-            place_indices = edits.movable_indices(mission)
-            nearest_index = min(place_indices, key=lambda place_index: abs(place_index - index))
-            mission = self.context.with_updated_radii(mission, nearest_index)
-        return mission, f"delete {count_text(len(set(indices)), 'item')}"
-
-    def _mission_with_suggestion(self, message: Apply) -> tuple[Mission, str]:
-        """Return the mission changed by a suggestion, and a description of the edit.
-
-        Raises MissionError for a suggestion that has not passed a trial on this revision.
-        """
-        mission, suggestion = self._tried_change(message)
-        source = "the flight" if message.flown else rule_word(self.judged.verdict.findings[message.finding].rule)
-        moves = item_moves(self.context, self.mission, mission)
-        is_move_only = moves and not suggested_parameters(suggestion)
-        edit_text = f"move {moves_text(moves)}" if is_move_only else suggestion_text(without_trial(suggestion))
-        return replace(mission, autopilot=self.mission.autopilot), f"apply a suggestion of {source}: {edit_text}"
-
-    def _tried_change(self, message: Apply) -> tuple[Mission, Suggestion]:
-        """Return the changed mission of a suggestion, and the suggestion.
-
-        Raises MissionError for a suggestion that has not passed a trial on this revision.
-        """
-        tried = self.tried.get("flown" if message.flown else "geometric")
-        change = tried.changes.get((message.finding, message.which)) if tried and tried.rev == self.rev else None
-        if change is None:
-            raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        return change
-
-    def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
-        """Return the mission with a planned path in place of the items between two items.
-
-        first, last: indices of the two items.
-        """
-        mission = self.mission
-        for index in [index for index in edits.movable_indices(mission) if first < index < last][::-1]:
-            mission = edits.delete_item(mission, index)
-        lat, lon = to_geo(self.context.scenario.origin, plan.waypoints[1:-1, 0], plan.waypoints[1:-1, 1])
-        inserted_index = first
-        for waypoint_lat, waypoint_lon, altitude in zip(
-            lat.tolist(), lon.tolist(), plan.waypoints[1:-1, 2].tolist(), strict=True
-        ):
-            previous_index, inserted_index = inserted_index, edits.insertion_index(mission, inserted_index)
-            mission = edits.insert_waypoint(mission, previous_index, waypoint_lat, waypoint_lon)
-            current_altitude = float(
-                self.context.item_positions(mission)[edits.movable_indices(mission).index(inserted_index), 2]
-            )
-            mission = edits.set_altitude(mission, inserted_index, altitude, current_altitude)
-        place_indices = edits.movable_indices(mission)
-        for index in place_indices[place_indices.index(first) : place_indices.index(inserted_index) + 2]:
-            mission = self.context.with_updated_radii(mission, index)
-        return mission
 
     def item_position(self, index: int) -> tuple[float, float, float]:
         """Return east, north and altitude AMSL of an item, m. Raises MissionError if the item has no position."""
@@ -643,7 +595,15 @@ class Session:
         self.aircraft_folders |= own_aircraft(self.context.scenario)
         self.replaced_settings = replaced_settings or self.replaced_settings
         if unused_edits:
-            self._set_aside(file, unused_edits)
+            try:
+                kept_file = set_autosave_aside(file)
+            except OSError:
+                self.unreadable.append(file)
+                kept_file = file
+            subject = "mission" if self.document.path is None else "mission file"
+            verb = "was" if unused_edits == 1 else "were"
+            edits_text = f"{count_text(unused_edits, 'earlier edit')} {verb} set aside in {kept_file}"
+            self.unused_text = f"the {subject} has changed since its last edit in the studio; {edits_text}"
             return False
         if is_edited or any(step.parameters for step in steps):
             self.history.steps = steps[:-1]
@@ -653,17 +613,6 @@ class Session:
             self._add_to_history(mission, text, steps[-1].parameters if steps else ())
         self.history.steps += undone_steps
         return is_edited or context is not previous_state[0]
-
-    def _set_aside(self, file: Path, count: int) -> None:
-        """Set an autosave aside, and note its edits.  count: number of its edits, which are not restored."""
-        try:
-            kept_file = set_autosave_aside(file)
-        except OSError:
-            self.unreadable.append(file)
-            kept_file = file
-        subject = "mission" if self.document.path is None else "mission file"
-        edits_text = f"{count_text(count, 'earlier edit')} {'was' if count == 1 else 'were'} set aside"
-        self.unused_text = f"the {subject} has changed since its last edit in the studio; {edits_text} in {kept_file}"
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:

@@ -77,24 +77,14 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
             _set_worse_state(legs, (leg + shift for leg in violated_legs(requirements, finding)), state)
             if place.index is not None:
                 (threats if place.kind in ("missile", "radar") else zones).add(place.index)
-    for leg, state in _missile_states(requirements).items():
-        _set_worse_state(legs, (leg + shift,), state)
-    return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
-
-
-def _missile_states(requirements: RouteRequirements) -> dict[int, State]:
-    """Return the states of the legs that pass a missile's sphere within `_NEAR_SPHERE_M` or the navigation error."""
+    # Legs near a missile's sphere.
     navigation_error, names = position_error(requirements.setup), requirements.setup.scenario.threats.names
     max_distance = max(_NEAR_SPHERE_M, navigation_error)
     error_text = f" (navigation error {quantity_text(navigation_error, 'm')})" if navigation_error > 0.0 else ""
-    return {
-        leg: State(
-            "near",
-            distance / max_distance,
-            f"{RULE_WORDS['threat'].word} {names[number]} {quantity_text(distance, 'm')} away" + error_text,
-        )
-        for leg, (distance, number) in legs_near_missiles(requirements, max_distance).items()
-    }
+    for leg, (distance, number) in legs_near_missiles(requirements, max_distance).items():
+        text = f"{RULE_WORDS['threat'].word} {names[number]} {quantity_text(distance, 'm')} away{error_text}"
+        _set_worse_state(legs, (leg + shift,), State("near", distance / max_distance, text))
+    return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
 
 
 def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
@@ -131,7 +121,13 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
     if finding.margin is None or finding.planned is None:
         return None
     closeness = _closeness(finding)
-    return State("near" if closeness < 1.0 else "ok", closeness, _value_text(finding))
+    value, limit_text = finding.compared_texts()
+    # A value beyond the limit but within the tolerance: the text names the tolerance and its purpose.
+    is_only_tolerated = closeness < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
+    if finding.limit is not None and (is_only_tolerated or finding.tolerance_note):
+        limit_text = limit_with_tolerance_text(finding)
+    text = f"{word} {value}" + (f" ({limit_text})" if limit_text else "")
+    return State("near" if closeness < 1.0 else "ok", closeness, text)
 
 
 def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
@@ -145,15 +141,3 @@ def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
     scale = RULE_WORDS[finding.rule].scale or math.inf
     near_margin = min(scale, _NEAR_FRACTION * abs(finding.limit)) if finding.limit else scale
     return ((finding.margin or 0.0) + tolerance) / near_margin if math.isfinite(near_margin) else math.inf
-
-
-def _value_text(finding: Finding) -> str:
-    """Return the rule, the value and the limit of a finding, such as "slope 5.2° (≤ 6.0°)".
-
-    If the value is beyond the limit but within the tolerance, the limit is followed by the tolerance and its purpose.
-    """
-    value, limit_text = finding.compared_texts()
-    is_only_tolerated = _closeness(finding) < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
-    if finding.limit is not None and (is_only_tolerated or finding.tolerance_note):
-        limit_text = limit_with_tolerance_text(finding)
-    return f"{finding_words(finding).word} {value}" + (f" ({limit_text})" if limit_text else "")

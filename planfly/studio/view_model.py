@@ -13,7 +13,6 @@ from flight.mission.edits import movable_indices
 from flight.mission.items import AMSL, OVER_HOME, Command, Mission, MissionItem, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.places import Suggestion, TriedSuggestions
 from logs.verdict.presentation import finding_words
@@ -32,7 +31,6 @@ from planfly.workflow.mission_context import JudgedMission
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
 from world.scenario import Scenario
-from world.threats import Threats
 
 Json = dict[str, Any]
 
@@ -69,69 +67,41 @@ def world_json(context: EditContext, setup: FlightSetup) -> Json:
     """Return page data of a mission's surroundings: area, threats, zones, ends and limits."""
     scenario, mission = context.scenario, setup.mission
     extent = scenario.bounds if scenario.external else map_extent(scenario, context.item_positions(mission), [])
+    # The terrain is shown on a larger extent, so that it also fills browser windows of other shapes.
+    east_north = np.asarray(extent, dtype=np.float64)
+    center, size = east_north.mean(axis=1), np.diff(east_north, axis=1)[:, 0]
+    longer_side = float(size.max())
+    min_size = np.array([_MIN_WIDTH_RATIO * longer_side, _MIN_HEIGHT_RATIO * longer_side])
+    half_size = 0.5 * np.maximum(_GROUND_RATIO * size, min_size)
+    threats = scenario.threats
+    # First the zones of the scenario, then those of the mission's fence: findings number the zones in this order.
+    zones = judged_airspace(setup).zones if mission.fences else scenario.zones
     return {
         "name": scenario.name,
         "origin": [scenario.origin.lat_deg, scenario.origin.lon_deg],
         "extent": round_to_json(extent),
-        "shown": round_to_json(_widen_extent(np.asarray(extent, dtype=np.float64))),
+        "shown": round_to_json(np.stack([center - half_size, center + half_size], axis=1)),
         "bounds": None if scenario.external else round_to_json(scenario.bounds),
         "floor": None if scenario.external else float(scenario.floor),
         "ceiling": None if scenario.external else float(scenario.ceiling),
         "clearance": float(scenario.limits.min_clearance_m),
         "ends": None if scenario.external else round_to_json(np.stack([scenario.start, scenario.destination])),
         "ground": scenario.terrain is not None,
-        "threats": _threats_json(scenario.threats),
-        "zones": _zones_json(scenario, mission, setup),
+        "threats": [
+            {"name": name, "at": round_to_json(position), "kill": round(kill, 1), "detection": round(detection, 1)}
+            for name, position, kill, detection in zip(
+                threats.names,
+                threats.position.tolist(),
+                threats.kill_radius.tolist(),
+                threats.detection_radius.tolist(),
+                strict=True,
+            )
+        ],
+        "zones": [
+            {"name": zone_text(zone), "kind": zone.kind, "rings": [round_to_json(ring) for ring in zone_rings(zone)]}
+            for zone in zones
+        ],
     }
-
-
-def _widen_extent(extent: Floats) -> Floats:
-    """Return a larger map extent, so that the terrain also fills browser windows of other shapes.
-
-    extent: minimum and maximum of east, then of north, (2, 2), m.
-    """
-    center, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
-    longer_side = float(size.max())
-    half_size = 0.5 * np.maximum(
-        _GROUND_RATIO * size, np.array([_MIN_WIDTH_RATIO * longer_side, _MIN_HEIGHT_RATIO * longer_side])
-    )
-    return np.stack([center - half_size, center + half_size], axis=1)
-
-
-def _threats_json(threats: Threats) -> list[Json]:
-    """Return page data of threats: name, position and radii, m."""
-    rows = zip(
-        threats.names,
-        threats.position.tolist(),
-        threats.kill_radius.tolist(),
-        threats.detection_radius.tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "name": name,
-            "at": round_to_json(position),
-            "kill": round(kill_radius, 1),
-            "detection": round(detection_radius, 1),
-        }
-        for name, position, kill_radius, detection_radius in rows
-    ]
-
-
-def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Return page data of the zones: first those of the scenario, then those of the mission's fence.
-
-    Findings number the zones in this order.
-    """
-    zones = judged_airspace(setup).zones if mission.fences else scenario.zones
-    return [
-        {
-            "name": zone_text(zone),
-            "kind": zone.kind,
-            "rings": [round_to_json(ring) for ring in zone_rings(zone)],
-        }
-        for zone in zones
-    ]
 
 
 # ----------------------------------------------------------------------
@@ -165,21 +135,21 @@ def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
 
 def windows_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
     """Return page data of the legs and corners that were judged near a moved item."""
-    return {"total_legs": route.legs, "windows": [_window_json(mission, route, window) for window in windows]}
-
-
-def _window_json(mission: Mission, route: Route, window: Window) -> Json:
-    """Return page data of the waypoints, the path and the states in a judged part of the route."""
-    first, last = window.first, window.last
-    path = window.requirements.path
-    states = place_states(window.requirements, window.findings, shift=window.start)
-    return {
-        "first": first,
-        "last": last,
-        **route_json(mission, route, first, last),
-        "path": _leg_paths(path.points, path.legs + window.start, first, last),
-        "states": states_json(states, first, last),
-    }
+    windows_data = []
+    for window in windows:
+        first, last = window.first, window.last
+        path = window.requirements.path
+        states = place_states(window.requirements, window.findings, shift=window.start)
+        windows_data.append(
+            {
+                "first": first,
+                "last": last,
+                **route_json(mission, route, first, last),
+                "path": _leg_paths(path.points, path.legs + window.start, first, last),
+                "states": states_json(states, first, last),
+            }
+        )
+    return {"total_legs": route.legs, "windows": windows_data}
 
 
 def items_json(context: EditContext, mission: Mission) -> list[Json]:
@@ -308,31 +278,29 @@ def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[J
     tried: suggestions that passed their trials; failed findings show no others.
     """
     verdict = replace(verdict, findings=with_passing_suggestions(verdict.findings, tried))
-    return [_finding_json(number, finding) for number, finding in verdict.findings_to_list(_MAX_LISTED_FINDINGS)]
+    return [
+        {
+            "number": number,
+            "rule": finding_words(finding).title,
+            "state": finding.state,
+            "ok": finding.ok,
+            "where": finding.where,
+            "kind": finding.place.kind,
+            "index": finding.place.index,
+            "text": finding.reason,
+            "suggestions": [
+                {"text": suggestion_text(suggestion), "apply": can_apply_in_studio(suggestion)}
+                for suggestion in finding.suggestions
+            ],
+        }
+        for number, finding in verdict.findings_to_list(_MAX_LISTED_FINDINGS)
+    ]
 
 
 def can_apply_in_studio(suggestion: Suggestion) -> bool:
     """Return True if the studio can make every change of a suggestion: to the items, or to a parameter."""
     item_changes = tuple(change for change in suggestion if change.what != "parameter")
     return bool(suggestion) and (not item_changes or can_apply(item_changes))
-
-
-def _finding_json(number: int, finding: Finding) -> Json:
-    """Return page data of a finding, with its suggestions.  number: index of the finding in the verdict."""
-    return {
-        "number": number,
-        "rule": finding_words(finding).title,
-        "state": finding.state,
-        "ok": finding.ok,
-        "where": finding.where,
-        "kind": finding.place.kind,
-        "index": finding.place.index,
-        "text": finding.reason,
-        "suggestions": [
-            {"text": suggestion_text(suggestion), "apply": can_apply_in_studio(suggestion)}
-            for suggestion in finding.suggestions
-        ],
-    }
 
 
 # ----------------------------------------------------------------------

@@ -270,7 +270,15 @@ class WorkerProcess:
                 # A pipe that is closed during a wait loses its handle, which raises TypeError.
                 break
             if answer.kind != "progress":
-                self._record_answer(pipe, answer)
+                # The task has ended; the timer is stopped if it waited for this task.
+                with self._condition:
+                    if self._newest_task is not None and answer.number == self._newest_task.number:
+                        self._newest_task = None
+                    if self._pipe is pipe and answer.number in self._unanswered:
+                        oldest_number = self._unanswered[0]
+                        self._unanswered.remove(answer.number)
+                        if answer.number == oldest_number:
+                            self._cancel_timer()
             self._on_answer(answer)
         reason = "the worker process has ended; try again"
         with self._condition:
@@ -283,17 +291,6 @@ class WorkerProcess:
                 self._newest_task = None
         for answer in answers:
             self._on_answer(answer)
-
-    def _record_answer(self, pipe: Connection, answer: Answer) -> None:
-        """Record that a task has ended, and stop the timer if it waited for this task."""
-        with self._condition:
-            if self._newest_task is not None and answer.number == self._newest_task.number:
-                self._newest_task = None
-            if self._pipe is pipe and answer.number in self._unanswered:
-                oldest_number = self._unanswered[0]
-                self._unanswered.remove(answer.number)
-                if answer.number == oldest_number:
-                    self._cancel_timer()
 
 
 # ----------------------------------------------------------------------
@@ -312,23 +309,16 @@ def run_worker(pipe: Connection) -> None:
     pending_task: Task | None = None
     while True:
         try:
-            task = _receive_newest(pipe, pending_task if pending_task is not None else pipe.recv())
+            task: Task | None = pending_task if pending_task is not None else pipe.recv()
+            # Only the newest task in the pipe is run; None only cancels.
+            while pipe.poll():
+                newer_task = pipe.recv()
+                if task is not None:
+                    pipe.send(Answer(task.number, "cancelled"))
+                task = newer_task
             pending_task = None if task is None else _run_task(pipe, task)
         except (EOFError, OSError):
             return
-
-
-def _receive_newest(pipe: Connection, task: Task | None) -> Task | None:
-    """Return the newest task in the pipe, or `task` if the pipe is empty; answer the other tasks as cancelled.
-
-    The newest task is None if the last message in the pipe only cancels.
-    """
-    while pipe.poll():
-        newer_task = pipe.recv()
-        if task is not None:
-            pipe.send(Answer(task.number, "cancelled"))
-        task = newer_task
-    return task
 
 
 def _run_task(pipe: Connection, task: Task) -> Task | None:

@@ -7,14 +7,12 @@ Arguments are pickled, and results are plain data. Returns and campaigns, which 
 import math
 import pickle
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from flight.mission.items import Mission
-from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.views.failures import track_distance
@@ -32,7 +30,6 @@ from planfly.workflow.uav import Uav
 from planner.evaluation.certify import least_height
 from planner.evaluation.problem import make_problem
 from planner.search.plan_front import FrontPlan
-from world.arrays import Floats
 from world.scenario import Scenario, scenario_from_spec
 
 # Maximum duration of a search for one path, for which a user waits, s.
@@ -58,6 +55,20 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     judged_mission = JudgedMission(mission, setup, requirements, flight.verdict)
     states = place_states(requirements, flight.verdict.findings)
     seconds = round(float(flight.track.time[-1]), 1) if len(flight.track) else 0.0
+    # Positions of the flown track, distances along the route for the profile, and times.
+    track = flight.track
+    track_data: dict[str, Any] = {"track": [], "along": []}
+    if len(track):
+        leg_ends = flight.verdict.leg_ends
+        if len(leg_ends) == len(setup.route.positions) - 2:
+            # The verdict's times at which legs ended replace the recorded leg numbers.
+            track = replace(track, leg=np.searchsorted(np.array(leg_ends), track.time).astype(track.leg.dtype))
+        rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _MAX_DRAWN_ROWS)), [len(track) - 1])
+        track_data = {
+            "track": round_to_json(track.position[rows]),
+            "along": round_to_json(np.asarray(track_distance(setup.route.positions, track))[rows]),
+            "time": round_to_json(track.time[rows]),
+        }
     return {
         "verdict": verdict_page_data(flight.verdict),
         "findings": findings_json(flight.verdict, ()),
@@ -69,7 +80,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
         "autopilot": setup.autopilot.title,
         "seconds": seconds,
         "figures": flight_results(mission, setup.route, flight.verdict.findings, seconds),
-        **_track_json(setup.route.positions, flight.track, flight.verdict.leg_ends),
+        **track_data,
     }
 
 
@@ -117,25 +128,6 @@ def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advanc
         if can_apply_in_studio(suggestion)
     }
     return {"findings": findings_json(verdict, tried), "changes": changes}
-
-
-def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
-    """Return page data of a flown track: positions, distances along the route for the profile, and times.
-
-    leg_ends: time at which each leg except the last ended according to the verdict, s; these times replace the recorded
-    leg numbers.
-    """
-    if not len(track):
-        return {"track": [], "along": []}
-    if len(leg_ends) == len(route) - 2:
-        track = replace(track, leg=np.searchsorted(np.array(leg_ends), track.time).astype(track.leg.dtype))
-    rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _MAX_DRAWN_ROWS)), [len(track) - 1])
-    distance = np.asarray(track_distance(route, track))
-    return {
-        "track": round_to_json(track.position[rows]),
-        "along": round_to_json(distance[rows]),
-        "time": round_to_json(track.time[rows]),
-    }
 
 
 # ----------------------------------------------------------------------

@@ -338,17 +338,7 @@ class _Trials:
         If that does not pass, try the fewest whole metres with which the overlaps would be judged as large enough.
         Returns None if no overlap fails, or if neither flight passes.
         """
-        climbs = (
-            max((math.ceil(missing_height(measure, tolerance)) for measure in self._overlaps), default=0)
-            for tolerance in (0.0, PHOTO_OVERLAP_TOLERANCE)
-        )
-        remedies = (self._try_climb(climb) for climb in climbs if climb > 0)
-        return next((remedy for remedy in remedies if remedy is not None), None)
-
-    def _try_climb(self, climb: int) -> SurveyRemedy | None:
-        """Try the lines higher by whole metres; return None if the flight does not pass."""
-        mission = self._setup.mission
-        route = self._setup.route
+        mission, route = self._setup.mission, self._setup.route
         altitudes, survey_items = route.positions[:, 2], set[int]()
         for survey in self._surveys:
             first, last = survey.first, survey.last
@@ -357,8 +347,14 @@ class _Trials:
             last += int(last + 1 < len(altitudes) and abs(altitudes[last + 1] - altitudes[last]) < _SAME_ALTITUDE_M)
             survey_items |= {int(route.items[i]) for i in range(first, last + 1)}
         indices = [index for index in movable_indices(mission) if mission.items[index].seq in survey_items]
-        flight = self._fly_trial(raise_items(mission, indices, float(climb)), self._uav, f"lines {climb} m higher")
-        return SurveyRemedy("height", "", 0.0, float(climb), "m", *flight) if self._is_remedy(flight) else None
+        for tolerance in (0.0, PHOTO_OVERLAP_TOLERANCE):
+            climb = max((math.ceil(missing_height(measure, tolerance)) for measure in self._overlaps), default=0)
+            if climb <= 0:
+                continue
+            flight = self._fly_trial(raise_items(mission, indices, float(climb)), self._uav, f"lines {climb} m higher")
+            if self._is_remedy(flight):
+                return SurveyRemedy("height", "", 0.0, float(climb), "m", *flight)
+        return None
 
     def find_turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes, or None.
@@ -466,7 +462,10 @@ class _Trials:
         if wind.speed <= 0.0:
             return None
         current_course, remedies = self._surveys[0].course, []
-        for course in _other_courses(current_course, wind.from_course):
+        for course in (wind.from_course, wind.from_course + 0.5 * math.pi):
+            # Courses close to the current course, in either direction of flight, are left out.
+            if abs(math.sin(course - current_course)) <= math.sin(math.radians(15.0)):
+                continue
             current_degrees, degrees = (math.degrees(angle) % 180.0 for angle in (current_course, course))
             flight = self._fly_layout(
                 SurveyLayout(self._current_turn_around, 1, course), f"lines on course {degrees:.0f}°"
@@ -748,14 +747,3 @@ def _commanded_airspeed(item: MissionItem) -> float:
     The result is 0 for other items, and NaN or negative if the item sets no airspeed.
     """
     return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0
-
-
-def _other_courses(course: float, wind: float) -> Iterator[float]:
-    """Yield the courses along and across the wind, unless they are close to the current course.
-
-    Courses within 15 degrees of the current course, in either direction of flight, are left out.
-    course, wind: current course of the lines, and course of the wind, rad.
-    """
-    for new_course in (wind, wind + 0.5 * math.pi):
-        if abs(math.sin(new_course - course)) > math.sin(math.radians(15.0)):
-            yield new_course

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 EXIT_CODES = """\
 exit codes: 0 flyable, or flown as planned
             1 internal or system error
-            2 incorrect usage or invalid input, nothing written
+            2 incorrect usage or invalid input; nothing is written, except the error in --json and --junit
             3 finished, but part of a log is unreadable, a campaign is undecided, or a flight is not judged in full
             4 not flyable, not flown as planned, or no feasible plan
             130 stopped by SIGINT (Ctrl-C), 143 by SIGTERM, within a second"""

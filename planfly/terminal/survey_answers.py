@@ -74,6 +74,12 @@ class OverlapEntry:
     """Overlap of photos on neighbouring lines."""
     side_asked: float | None
     side_lines: tuple[int, int] | None
+    side_judged: bool
+    """False if the side overlap is large enough, but the crab angle makes the common area too small."""
+    crab_angle_deg: float
+    """Largest angle between the nose and the line at the usable photos; 0 without a flight."""
+    side_common_area: float | None
+    """Common area of the two photos with the least side overlap, turned by their crab angles."""
     ground_sampling_cm: tuple[float, float] | None
     """Smallest and largest distance on the ground between two pixels; null if the pixels are not known."""
 
@@ -162,6 +168,9 @@ def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
         side=None if overlap.side is None else round(overlap.side, 4),
         side_asked=overlap.camera.side,
         side_lines=None if overlap.side is None else (first_line + 1, second_line + 1),
+        side_judged=not overlap.is_side_unknown,
+        crab_angle_deg=round(math.degrees(overlap.max_crab), 1),
+        side_common_area=None if overlap.side is None else round(overlap.side_area, 4),
         ground_sampling_cm=None if sampling is None else (round(100.0 * sampling[0], 2), round(100.0 * sampling[1], 2)),
     )
 

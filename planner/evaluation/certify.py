@@ -45,7 +45,18 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     # Copy the array: a plan's waypoints are read-only, for which the kernels would be compiled again.
     waypoints = np.array(waypoints, dtype=np.float64)
     problems: list[str] = []
-    turn = _turn_margin(data, waypoints, problems)
+    turns = turning_angles(with_end_course_points(data, waypoints))
+    problems += _summarise_faults(
+        [
+            (
+                data.max_turn - turn,
+                f"waypoint {i}",
+                f"turns {math.degrees(turn):.1f}°; at most {math.degrees(data.max_turn):.1f}° are allowed",
+            )
+            for i, turn in enumerate(turns.tolist())
+            if data.max_turn - turn < -_EPSILON
+        ]
+    )
     available_length = _leg_length_margin(data, waypoints, problems)
     slope = min(_arc_slope_margin(data, waypoints, problems), _leg_slope_margin(data, waypoints, problems))
     clearance = _clearance_margin(data, waypoints, problems)
@@ -53,7 +64,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     distance = kill_distance(data, waypoints)
     zones, headroom = _airspace_margins(problem, waypoints, problems)
     return Certificate(
-        turn,
+        _without_rounding(float((data.max_turn - turns).min(initial=math.inf))),
         available_length,
         _without_rounding(float(slope)),
         clearance,
@@ -125,23 +136,6 @@ def _without_rounding(margin: float) -> float:
     Therefore a margin below 0 always means a problem.
     """
     return 0.0 if -_EPSILON <= margin < 0.0 else margin
-
-
-def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a turn to its limit, rad; append turns that are too sharp to `problems`."""
-    turns = turning_angles(with_end_course_points(data, waypoints))
-    problems += _summarise_faults(
-        [
-            (
-                data.max_turn - turn,
-                f"waypoint {i}",
-                f"turns {math.degrees(turn):.1f}°; at most {math.degrees(data.max_turn):.1f}° are allowed",
-            )
-            for i, turn in enumerate(turns.tolist())
-            if data.max_turn - turn < -_EPSILON
-        ]
-    )
-    return _without_rounding(float((data.max_turn - turns).min(initial=math.inf)))
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -330,12 +324,24 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
             )
         if piece_headroom < float(piece["buffer"]) - _EPSILON:
             height_faults[name] = min(height_faults.get(name, math.inf), piece_headroom)
-    for zone in dict.fromkeys(z for _, z in zone_faults.values()):
+    for index in dict.fromkeys(z for _, z in zone_faults.values()):
+        required = space.zones.required[index]
+        zone = problem.scenario.zones[int(required["number"])]
+        side, relation = ("inside", "from") if zone.kind == "exclusion" else ("outside", "inside the edge of")
+        required_text = (
+            f"{required['horizontal']:g} m horizontally or {required['vertical']:g} m vertically are required"
+        )
         problems += _summarise_faults(
             [
-                (distance, name, _zone_fault_text(problem, distance, z))
+                (
+                    distance,
+                    name,
+                    f"{-distance:.1f} m {side} {zone.name}"
+                    if distance < 0.0
+                    else f"{distance:.1f} m {relation} {zone.name}; {required_text}",
+                )
                 for name, (distance, z) in zone_faults.items()
-                if z == zone
+                if z == index
             ]
         )
     required_text = f"at most {space.max_height:g} m minus a margin of {space.buffer:.1f} m are allowed"
@@ -350,18 +356,3 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
         ]
     )
     return _without_rounding(float(pieces["zones"]["excess"].min())), _without_rounding(headroom)
-
-
-def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
-    """Describe a piece of the path that is in a zone or too close to it.
-
-    distance: distance from the zone, m; negative if the zone is violated.
-    z: index of the zone among the zones of the kernels.
-    """
-    required = problem.certified.airspace.zones.required[z]
-    zone = problem.scenario.zones[int(required["number"])]
-    if distance < 0.0:
-        return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
-    relation = "from" if zone.kind == "exclusion" else "inside the edge of"
-    required_text = f"{required['horizontal']:g} m horizontally or {required['vertical']:g} m vertically are required"
-    return f"{distance:.1f} m {relation} {zone.name}; {required_text}"

@@ -75,10 +75,17 @@ def find_separating_zones(scenario: Scenario) -> SeparatingZones | None:
         max_altitudes = np.minimum(max_altitudes, ground_altitudes + scenario.limits.max_height_m)
     cells = np.full((LEVEL_COUNT, *ground_altitudes.shape), _OPEN_CELL, dtype=np.int64)
     cells[:, ~(min_altitudes <= max_altitudes)] = _GROUND_CELL
-    ends = [
-        _end_cell(scenario, end, cell_side, min_altitudes, max_altitudes)
-        for end in (scenario.start, scenario.destination)
-    ]
+    # Level, row and column of the cells of both ends; the levels divide each column evenly between its altitudes.
+    ends = []
+    for position in (scenario.start, scenario.destination):
+        cell = ((position[:2] - scenario.bounds[:, 0]) / cell_side).astype(np.int64)
+        row, column = (
+            int(np.clip(index, 0, size - 1)) for index, size in zip(cell[::-1], ground_altitudes.shape, strict=True)
+        )
+        min_altitude, max_altitude = min_altitudes[row, column], max_altitudes[row, column]
+        fraction = (position[2] - min_altitude) / max(float(max_altitude - min_altitude), 1e-6)
+        level = int(np.clip(round(fraction * (LEVEL_COUNT - 1)), 0, LEVEL_COUNT - 1))
+        ends.append((level, row, column))
     if not _are_connected(cells, ends):
         return None
     _close_cells(zone_records(scenario.zones), east, north, ground_altitudes, min_altitudes, max_altitudes, cells)
@@ -90,27 +97,6 @@ def find_separating_zones(scenario: Scenario) -> SeparatingZones | None:
     adjacent_zones = [set(cells[edge_cells].tolist()) for edge_cells in adjacent_cells]
     zone_indices = (adjacent_zones[0] & adjacent_zones[1]) or (adjacent_zones[0] | adjacent_zones[1])
     return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(zone_indices) if z >= 0), cell_side)
-
-
-def _end_cell(
-    scenario: Scenario, end: Floats, cell_side: float, min_altitudes: Floats, max_altitudes: Floats
-) -> tuple[int, int, int]:
-    """Return level, row and column of the cell that contains a fixed end of the path.
-
-    end: position of the end, (3,) m.
-    cell_side: side of a cell, m.
-    min_altitudes, max_altitudes: (rows, columns) lowest and highest allowed altitude, m; the levels divide each column
-        evenly between them.
-    """
-    cell = ((end[:2] - scenario.bounds[:, 0]) / cell_side).astype(np.int64)
-    column, row = (
-        int(np.clip(index, 0, size - 1))
-        for index, size in zip(cell, (min_altitudes.shape[1], min_altitudes.shape[0]), strict=True)
-    )
-    fraction = (end[2] - min_altitudes[row, column]) / max(
-        float(max_altitudes[row, column] - min_altitudes[row, column]), 1e-6
-    )
-    return int(np.clip(round(fraction * (LEVEL_COUNT - 1)), 0, LEVEL_COUNT - 1)), row, column
 
 
 def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
@@ -313,6 +299,8 @@ def _describe_walls(scenario: Scenario) -> list[str]:
     terrain = scenario.terrain
     if terrain is None:
         return []
+    has_missile = scenario.threats.kill_radius > 0.0
+    positions, kill_radii = scenario.threats.position[has_missile], scenario.threats.kill_radius[has_missile]
     lines: list[str] = []
     for distance, points in _map_crossings(scenario):
         min_altitudes = terrain.height(points[:, 0], points[:, 1]) + scenario.limits.min_clearance_m
@@ -325,7 +313,18 @@ def _describe_walls(scenario: Scenario) -> list[str]:
                 f" {scenario.ceiling:.0f} m AMSL"
             )
             break
-        if not _has_gap(scenario, points[gaps > 0.0], min_altitudes[gaps > 0.0]):
+        # Nine altitudes are tested at each point, from the lowest allowed one to the ceiling. Without a ceiling there
+        # is always a gap.
+        open_points, lowest_altitudes = points[gaps > 0.0], min_altitudes[gaps > 0.0]
+        has_gap = math.isinf(scenario.ceiling)
+        for fraction in np.linspace(0.0, 1.0, 9):
+            altitudes = lowest_altitudes + fraction * (scenario.ceiling - lowest_altitudes)
+            squares = (np.column_stack([open_points, altitudes])[:, None] - positions) ** 2
+            distances2 = squares[..., 0] + squares[..., 1] + squares[..., 2]
+            if (distances2 > kill_radii * kill_radii).all(axis=1).any():
+                has_gap = True
+                break
+        if not has_gap:
             line = f"terrain and missiles together block every route {distance:.0f} m from the start, at every height"
             lines.append(line)
             break
@@ -367,28 +366,6 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
                 f" {name} allows {ceiling:.0f} m AMSL"
             ]
     return []
-
-
-def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) -> bool:
-    """Return True if an altitude above at least one of the points (n, 2) is outside all kill spheres.
-
-    Nine altitudes are tested at each point, from the lowest allowed one to the ceiling. Without a ceiling there is
-    always a gap.
-
-    min_altitudes: lowest allowed altitude at each point, m, (n,).
-    """
-    threats = scenario.threats
-    has_missile = threats.kill_radius > 0.0
-    positions, radii = threats.position[has_missile], threats.kill_radius[has_missile]
-    for fraction in np.linspace(0.0, 1.0, 9):
-        altitudes = min_altitudes + fraction * (scenario.ceiling - min_altitudes)
-        is_free = np.ones(len(points), dtype=np.bool_)
-        for centre, kill_radius in zip(positions, radii, strict=True):
-            distance2 = (points[:, 0] - centre[0]) ** 2 + (points[:, 1] - centre[1]) ** 2 + (altitudes - centre[2]) ** 2
-            is_free &= distance2 > kill_radius * kill_radius
-        if is_free.any():
-            return True
-    return math.isinf(scenario.ceiling)
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:

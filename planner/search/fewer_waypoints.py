@@ -7,10 +7,9 @@ import numpy as np
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, Problem, make_problem
-from planner.plan import Certificate, Objectives, Plan, Violations
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, make_problem
+from planner.plan import Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
-from world.arrays import Floats
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
@@ -32,35 +31,24 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     scenario = plan.scenario
     problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
     min_kill_distance = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN_M)
-    while (shorter := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
-        waypoints, certificate = shorter
-        violations, objectives = paper_scores(problem.certified, waypoints[None])
-        plan = replace(
-            plan,
-            waypoints=waypoints,
-            certificate=certificate,
-            violations=Violations(*violations[0]),
-            objectives=Objectives(*objectives[0]),
-        )
+    has_dropped = True
+    while has_dropped:
+        has_dropped = False
+        legs, chords = np.diff(plan.waypoints, axis=0), plan.waypoints[2:] - plan.waypoints[:-2]
+        lengths = np.linalg.norm(legs, axis=1)
+        detours = lengths[:-1] + lengths[1:] - np.linalg.norm(chords, axis=1)
+        for i in 1 + np.argsort(detours, kind="stable"):
+            waypoints = np.delete(plan.waypoints, i, axis=0)
+            certificate = certify(problem, waypoints)
+            violations, objectives = paper_scores(problem.certified, waypoints[None])
+            if certificate.ok and certificate.kill_distance >= min_kill_distance and not violations.any():
+                plan = replace(
+                    plan,
+                    waypoints=waypoints,
+                    certificate=certificate,
+                    violations=Violations(*violations[0]),
+                    objectives=Objectives(*objectives[0]),
+                )
+                has_dropped = True
+                break
     return plan
-
-
-def _drop_one_waypoint(
-    problem: Problem, waypoints: Floats, min_kill_distance: float
-) -> tuple[Floats, Certificate] | None:
-    """Remove one waypoint of a path (w, 3); return the new path and its certificate, or None if impossible.
-
-    min_kill_distance: required distance from missiles, m.
-
-    The new path must meet the certificate's margins. The waypoint with the smallest detour is tried first.
-    """
-    legs, chords = np.diff(waypoints, axis=0), waypoints[2:] - waypoints[:-2]
-    lengths = np.linalg.norm(legs, axis=1)
-    detours = lengths[:-1] + lengths[1:] - np.linalg.norm(chords, axis=1)
-    for i in 1 + np.argsort(detours, kind="stable"):
-        remaining_waypoints = np.delete(waypoints, i, axis=0)
-        certificate = certify(problem, remaining_waypoints)
-        violations, _ = paper_scores(problem.certified, remaining_waypoints[None])
-        if certificate.ok and certificate.kill_distance >= min_kill_distance and not violations.any():
-            return remaining_waypoints, certificate
-    return None

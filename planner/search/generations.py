@@ -204,7 +204,21 @@ def run_waypoint_generations(search: Search, population: int, generations: int) 
         rows = rows[:, : chains.cost.shape[1]]
         search.legs += chains.legs
         search.evaluations += math.ceil(chains.legs / (inner_count + 1))
-        _evaluate_best(search, rows, chains)
+        # Evaluate whole paths through some of the best candidates of some intervals; without any, the path of the first
+        # candidates. If no path in the archive is feasible, a pattern search tries to repair the best one.
+        candidate_chains = {
+            tuple(chains.path_through(i, int(k))[1:-1].tolist())
+            for i in range(1, len(chains.cost) - 1, INTERVAL_STEP)
+            for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]
+            if chains.cost[i, k] < math.inf
+        }
+        if candidate_chains:
+            chain_rows = [rows[np.arange(len(rows)), list(chain)].ravel() for chain in sorted(candidate_chains)]
+            search.evaluate(np.array(chain_rows))
+            if not search.archive.is_feasible():
+                search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)
+        else:
+            search.evaluate(_as_vectors(rows[:, :1]))
         search.record_history()
         search.done += 1
         search.report_progress(generation_count - generation - 1)
@@ -301,27 +315,3 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
             break
         search.pause()
     return chains._replace(legs=legs)
-
-
-def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate whole paths through some of the best candidates of some intervals.
-
-    Without any path through candidates, the path of the first candidates is evaluated. If no path in the archive is
-    feasible, a pattern search tries to repair the best one.
-
-    rows: (intervals, candidates, 3) candidates in the rotated frame.
-    chains: best path through each candidate.
-    """
-    candidate_chains = set()
-    for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
-        for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:
-            if chains.cost[i, k] < math.inf:
-                candidate_chains.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
-    if not candidate_chains:
-        search.evaluate(_as_vectors(rows[:, :1]))
-        return
-    intervals = np.arange(len(rows))
-    vectors = np.array([rows[intervals, list(chain)].ravel() for chain in sorted(candidate_chains)])
-    search.evaluate(vectors)
-    if not search.archive.is_feasible():
-        search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)

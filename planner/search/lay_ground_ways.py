@@ -467,6 +467,8 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
     altitude: altitude for which the climb performance is computed, m AMSL.
     """
+    airspeed = site.limits.airspeed
+    climb_time = takeoff_height / (_SLOW_TAKEOFF_SLOPE * airspeed)
     courses = (
         [2.0 * math.pi * number / _LAUNCH_COURSE_COUNT for number in range(_LAUNCH_COURSE_COUNT)]
         if launch.course is None
@@ -503,7 +505,18 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
                 best_rejected = max(best_rejected, (-1e6, f"{course_text} ({obstacle})"))
                 break
             takeoff_end = (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north)
-            launches.append(_Launch(course, takeoff_end, end, _drifted_ends(site, course, takeoff_height)))
+            # Ends of a slow take-off in the least and in the strongest expected crosswind.
+            tailwind, crosswind = site.scenario.wind.components_on_course(course, home_altitude)
+            slow_distance = climb_time * max(1.0, airspeed + tailwind)
+            drifts = [
+                _DRIFT_FRACTION * climb_time * (crosswind + error)
+                for error in (-_WIND_FORECAST_ERROR_MPS, _WIND_FORECAST_ERROR_MPS)
+            ]
+            drifted_ends = tuple(
+                (home[0] + slow_distance * east + drift * north, home[1] + slow_distance * north - drift * east)
+                for drift in drifts
+            )
+            launches.append(_Launch(course, takeoff_end, end, drifted_ends))
     if not launches and not best_rejected[1]:
         course_name = "any course" if launch.course is None else "the launch course"
         return [], f"the aircraft cannot climb on {course_name}"
@@ -513,26 +526,6 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
         launches,
         f"{subject} {negation}clear of ground, missiles and zones at {SLOPE_FRACTION:.0%} of the "
         f"steepest climb{best_text}{best_rejected[1]}",
-    )
-
-
-def _drifted_ends(site: _Site, course: float, takeoff_height: float) -> tuple[MapPoint, ...]:
-    """Return the points where a slow take-off ends in the least and in the strongest expected crosswind.
-
-    course: launch course, rad.
-    takeoff_height: height above home at the end of the take-off, m.
-    """
-    tailwind, crosswind = site.scenario.wind.components_on_course(course, float(site.home[2]))
-    climb_time = takeoff_height / (_SLOW_TAKEOFF_SLOPE * site.limits.airspeed)
-    distance = climb_time * max(1.0, site.limits.airspeed + tailwind)
-    east, north = math.sin(course), math.cos(course)
-    drifts = [
-        _DRIFT_FRACTION * climb_time * (crosswind + error)
-        for error in (-_WIND_FORECAST_ERROR_MPS, _WIND_FORECAST_ERROR_MPS)
-    ]
-    return tuple(
-        (site.home[0] + distance * east + drift * north, site.home[1] + distance * north - drift * east)
-        for drift in drifts
     )
 
 
@@ -758,6 +751,7 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     extra_length = math.dist(previous_points[-1], start) + math.dist(end, glide_start)
     extra_length += sum(math.dist(leg_start, leg_end) for leg_start, leg_end in pairwise(previous_points))
     min_length = site.min_path_length(end_altitude - final_altitude, is_descent) + extra_length
+    top_altitude = max(end_altitude, final_altitude)
     for laps in _list_lap_counts(site, end_altitude - final_altitude, is_descent):
         paths = [
             [start, *corners, end]
@@ -773,7 +767,10 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
         ]
         for _, points in sorted(fitting_paths):
             for slope_factor in _SLOPE_FACTORS:
-                altitudes = _approach_altitudes(site, points, slope_factor, end_altitude, final_altitude)
+                climb, dive = (
+                    partial(_scale_slope, site, slope_factor, dives, top_altitude) for dives in (False, True)
+                )
+                altitudes = descent_altitudes(points, end_altitude, climb, dive, final_altitude)
                 if abs(altitudes[0] - end_altitude) > 1e-6 or abs(altitudes[-1] - final_altitude) > 1e-6:
                     break
                 path = _join_altitudes(points, altitudes)
@@ -793,22 +790,6 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
         f"none of {best_rejected.count} paths {route_text} is clear; the best path: {best_rejected.problem}."
         " Try a higher destination (height_m) or another strip",
     )
-
-
-def _approach_altitudes(
-    site: _Site, points: list[MapPoint], slope_factor: float, start_altitude: float, end_altitude: float
-) -> Floats:
-    """Return the altitudes of a path between two altitudes, (n,) m AMSL.
-
-    The path climbs and descends at a fraction of its slope limits.
-
-    points: (n) east and north of the path, m.
-    slope_factor: fraction of the slope limits.
-    start_altitude, end_altitude: m AMSL.
-    """
-    top_altitude = max(start_altitude, end_altitude)
-    climb, dive = (partial(_scale_slope, site, slope_factor, is_descent, top_altitude) for is_descent in (False, True))
-    return descent_altitudes(points, start_altitude, climb, dive, end_altitude)
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
@@ -850,6 +831,9 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
             (top_altitude - field_altitude) / climb_slope,
         )
         margins = (field_altitude + climb_slope * distances - terrain_heights)[distances > _LAUNCH_RUN_M]
+        # Over unknown ground the margin is NaN.
+        if not (margins >= 0.0).all():
+            continue
         turn_point = np.array(
             [
                 final.point[0] + distances[-1] * math.sin(final.course),
@@ -857,28 +841,17 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
                 top_altitude,
             ]
         )
-        if (margins >= 0.0).all() and _min_height_to_line_up(site, turn_point, line_up) >= _GO_AROUND_CLEARANCE_M:
+        # Heights above ground from there back to the line-up.
+        length = float(leg_runs(np.stack([turn_point, line_up]))[0])
+        fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
+        east, north = (turn_point[axis] + fractions * (line_up[axis] - turn_point[axis]) for axis in range(2))
+        if line_up[2] > top_altitude:
+            course = math.atan2(line_up[0] - turn_point[0], line_up[1] - turn_point[1])
+            climb_slope = site.slopes(course, float(line_up[2]))[0]
+            altitudes = np.minimum(line_up[2], top_altitude + max(0.0, climb_slope) * length * fractions)
+        else:
+            altitudes = top_altitude + fractions * (line_up[2] - top_altitude)
+        heights = altitudes - site.terrain.height(east, north)
+        if (heights >= _GO_AROUND_CLEARANCE_M).all():
             return float(height)
     return None
-
-
-def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> float:
-    """Return the minimum height above ground between the end of a go-around's climb and the line-up, m.
-
-    turn_point: end of the go-around's climb, (3,) m.
-    line_up: point at which the final begins, (3,) m.
-
-    Returns -inf if the ground is unknown.
-    """
-    length = float(leg_runs(np.stack([turn_point, line_up]))[0])
-    fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
-    east, north = (turn_point[axis] + fractions * (line_up[axis] - turn_point[axis]) for axis in range(2))
-    if line_up[2] > turn_point[2]:
-        climb_slope = site.slopes(
-            math.atan2(line_up[0] - turn_point[0], line_up[1] - turn_point[1]), float(line_up[2])
-        )[0]
-        altitudes = np.minimum(line_up[2], turn_point[2] + max(0.0, climb_slope) * length * fractions)
-    else:
-        altitudes = turn_point[2] + fractions * (line_up[2] - turn_point[2])
-    heights = altitudes - site.terrain.height(east, north)
-    return -math.inf if np.isnan(heights).any() else float(heights.min())

@@ -10,6 +10,7 @@ constraints of a search, and every plan of the front has its own certificate.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -337,31 +338,33 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
     They are the default path (w, 3), and shortened paths. The shortened paths are made of the default path and of
     routes on all sides of the missiles and radars. Shortening ignores zones; if there are any, the routes are yielded,
     too.
+
+    Each radar is a missile sphere for each of `RADAR_FRACTIONS` of its detection radius. The buffer is at least one of
+    `CLEARANCE_FRACTIONS` of the spare height above the required clearance, which is the smaller one of both ends. The
+    cost is the cost of the problem, and then the cost of the fourth objective.
     """
     yield default
-    count = len(default)
-    for data in _problems_with_radars(task):
+    count, all_threats = len(default), task.problem.scenario.threats
+    has_radar = (all_threats.detection_radius > 0.0).any()
+    for radar_fraction in RADAR_FRACTIONS if has_radar else RADAR_FRACTIONS[:1]:
+        threats = threat_records(all_threats).copy()
+        threats["kill_radius"] = np.maximum(threats["kill_radius"], radar_fraction * threats["detection_radius"])
+        # Read-only like a scenario's threats: for a writable array the kernels would be compiled again.
+        threats.setflags(write=False)
+        data = task.problem.search._replace(threats=threats, missiles=make_missile_index(threats))
         routes = _list_routes(data, task.frame, default)
         if is_limited(data.airspace):
             yield from routes
-        for preferred_problem in _preferred_problems(task, data):
+        end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
+        spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
+        for clearance_fraction, travel in product(CLEARANCE_FRACTIONS, (data.travel, task.travel)):
+            buffer = max(data.buffer, clearance_fraction * spare_height)
+            preferred_problem = data._replace(buffer=buffer, travel=travel)
             for route in [default, *routes]:
                 path, _ = shorten_path(preferred_problem, route)
                 # Shorten again from equal legs, as for the default plan.
                 path, _ = shorten_path(preferred_problem, resample(path, count))
                 yield path
-
-
-def _problems_with_radars(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield the problem with each radar as a missile sphere, for each of `RADAR_FRACTIONS` of its detection radius."""
-    scenario = task.problem.scenario
-    has_radar = (scenario.threats.detection_radius > 0.0).any()
-    for fraction in RADAR_FRACTIONS if has_radar else RADAR_FRACTIONS[:1]:
-        threats = threat_records(scenario.threats).copy()
-        threats["kill_radius"] = np.maximum(threats["kill_radius"], fraction * threats["detection_radius"])
-        # Read-only like a scenario's threats: for a writable array the kernels would be compiled again.
-        threats.setflags(write=False)
-        yield task.problem.search._replace(threats=threats, missiles=make_missile_index(threats))
 
 
 def _list_routes(data: ProblemArrays, frame: RotatedFrame, default: Floats) -> list[Floats]:
@@ -386,21 +389,6 @@ def _list_routes(data: ProblemArrays, frame: RotatedFrame, default: Floats) -> l
     )
     routes = side_routes(data, frame, grid, bound, MAX_ROUTES)
     return [resample(frame.to_world(route.points), count) for route in routes]
-
-
-def _preferred_problems(task: FrontTask, data: ProblemArrays) -> Iterator[ProblemArrays]:
-    """Yield a problem and stricter variants: combinations of clearance and cost.
-
-    - Clearance: the buffer is at least one of `CLEARANCE_FRACTIONS` of the spare height above the required clearance,
-      which is the smaller one of both ends.
-    - Cost: the cost of the problem, and then the cost of the fourth objective, `task.travel`.
-    """
-    end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
-    spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
-    for fraction in CLEARANCE_FRACTIONS:
-        stricter_problem = data._replace(buffer=max(data.buffer, fraction * spare_height))
-        yield stricter_problem
-        yield stricter_problem._replace(travel=task.travel)
 
 
 # --- The search ---
@@ -557,12 +545,12 @@ def _certify_distinct(
         for row in rows:
             if row not in plans:
                 path = task.to_paths(search.vectors[row][None])[0]
-                counts, objectives = paper_scores(task.problem.certified, path[None])
+                counts, scores = paper_scores(task.problem.certified, path[None])
                 plan = replace(
                     template,
                     waypoints=path,
                     violations=Violations(*counts[0]),
-                    objectives=Objectives(*objectives[0]),
+                    objectives=Objectives(*scores[0]),
                     certificate=certify(task.problem, path),
                     procedures=None,
                 )
@@ -570,23 +558,17 @@ def _certify_distinct(
         rejected_rows = [row for row in rows if not plans[row].plan.safe]
         accepted_plans: list[FrontPlan] = []
         if not rejected_rows:
-            accepted_plans = _drop_dominated([*(plans[row] for row in rows), default_plan], task.fourth, amounts)
+            # Accept the plans that no other plan dominates and that differ noticeably from each other; of several equal
+            # plans, the first.
+            candidates = [*(plans[row] for row in rows), default_plan]
+            objectives = np.array([_objective_row(plan, task.fourth) for plan in candidates])
+            indices = np.arange(len(objectives))
+            is_better = (objectives[:, None] < objectives[None]).any(axis=2) | (indices[:, None] < indices)
+            is_dominated = ((objectives[:, None] <= objectives[None]).all(axis=2) & is_better).any(axis=0)
+            undominated_rows = np.flatnonzero(~is_dominated)
+            accepted_rows = undominated_rows[distinct_rows(objectives[undominated_rows], amounts)]
+            accepted_plans = [candidates[k] for k in accepted_rows.tolist()]
             rejected_rows = [row for row in rows if not any(plan is plans[row] for plan in accepted_plans)]
         if not rejected_rows:
             return accepted_plans[:count], sum(not plan.plan.safe for plan in plans.values())
         remaining_rows = np.setdiff1d(remaining_rows, rejected_rows)
-
-
-def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans that no other plan dominates and that differ noticeably from each other.
-
-    fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
-    amounts: noticeable difference in each objective.
-    """
-    objectives = np.array([_objective_row(plan, fourth) for plan in plans])
-    indices = np.arange(len(objectives))
-    # Keep the first of several equal plans.
-    is_better = (objectives[:, None] < objectives[None]).any(axis=2) | (indices[:, None] < indices)
-    is_dominated = ((objectives[:, None] <= objectives[None]).all(axis=2) & is_better).any(axis=0)
-    undominated_rows = np.flatnonzero(~is_dominated)
-    return [plans[k] for k in undominated_rows[distinct_rows(objectives[undominated_rows], amounts)].tolist()]

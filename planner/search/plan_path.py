@@ -18,7 +18,7 @@ from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import GIVEN_WAYPOINTS, Certificate, Objectives, Plan, Violations
-from planner.search.algorithms import Algorithm, find_algorithm, limits_for
+from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, run_path_generations, run_waypoint_generations
 from planner.search.infeasibility_proof import is_closed
 from planner.search.search_cheapest import make_objective_cost, search_cheapest_path
@@ -128,8 +128,16 @@ def plan_path(
             path_certificate = certify(problem, path)
         return search, path, path_certificate
 
+    # A path with more waypoints may turn more often; fewer waypoints are easier to place. If the scenario states a
+    # large number, a search with the default number is repeated, and legs of its path are halved to get the stated one.
+    other_counts: tuple[int, ...] = ()
+    if previous is None and found_algorithm.seeded and found_algorithm.encoding == "rotated":
+        if "waypoints" not in scenario.planner.model_fields_set:
+            other_counts = (MORE_WAYPOINTS,)
+        elif scenario.planner.waypoints > DEFAULT_WAYPOINTS:
+            other_counts = (DEFAULT_WAYPOINTS,)
     result = best = search_with(scenario.planner.waypoints, 0)
-    for count in _other_waypoint_counts(scenario, found_algorithm, previous):
+    for count in other_counts:
         if not result[0].must_end() and _needs_other_count(best, count):
             result = search_with(count, result[0].evaluations)
             best = result if _is_better(result, best) else best
@@ -147,21 +155,6 @@ def plan_path(
         history=np.array(search.history).reshape(-1, 3),
         ended=result[0].end_reason,
     )
-
-
-def _other_waypoint_counts(scenario: Scenario, algorithm: Algorithm, previous_path: Floats | None) -> tuple[int, ...]:
-    """Return the numbers of waypoints, other than the scenario's, with which a search may be repeated.
-
-    A path with more waypoints may turn more often; fewer waypoints are easier to place. If the scenario states a large
-    number, a search with the default number is repeated, and legs of its path are halved to get the stated number.
-
-    previous_path: older path to start from, which fixes the number; or None.
-    """
-    if previous_path is not None or not algorithm.seeded or algorithm.encoding != "rotated":
-        return ()
-    if "waypoints" not in scenario.planner.model_fields_set:
-        return (MORE_WAYPOINTS,)
-    return (DEFAULT_WAYPOINTS,) if scenario.planner.waypoints > DEFAULT_WAYPOINTS else ()
 
 
 def _needs_other_count(best: _Result, count: int) -> bool:

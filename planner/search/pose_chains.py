@@ -57,9 +57,14 @@ def candidate_chains(
     turn_radius: radius of the tightest turn, m.
     laps: number of square laps before the other corners.
     """
-    lap_chains: list[list[MapPoint]] = [[]]
-    if laps:
-        lap_chains = [_lap_corners(start, course, sign * LAP_SIDE_RADII * turn_radius, laps) for sign in (1.0, -1.0)]
+    # Square laps to the right and to the left, which begin and end at `start`.
+    lap_chains: list[list[MapPoint]] = [] if laps else [[]]
+    for cross_course in (course + 0.5 * math.pi, course - 0.5 * math.pi) if laps else ():
+        side = LAP_SIDE_RADII * turn_radius
+        ahead_corner = _offset_point(start, course, side)
+        far_corner = _offset_point(ahead_corner, cross_course, side)
+        cross_corner = _offset_point(start, cross_course, side)
+        lap_chains.append([ahead_corner, far_corner, cross_corner, start] * laps)
     last_corners = [_offset_point(end, end_course, -radii * turn_radius) for radii in _LAST_LEG_RADII]
     short_ends: list[list[MapPoint]] = [[], *([last_corner] for last_corner in last_corners)]
     base_ends = [
@@ -82,18 +87,6 @@ def candidate_chains(
         for first_corner in first_corners[1 : 3 * _FIRST_DIRECTION_COUNT : 2]:
             for end_corners in base_ends:
                 yield [*lap_corners, *first_corner, *end_corners]
-
-
-def _lap_corners(start: MapPoint, course: float, signed_side: float, laps: int) -> list[MapPoint]:
-    """Return the corners of square laps that begin and end at `start` on a course (rad).
-
-    signed_side: side of the square, m; negative for laps to the left.
-    """
-    cross_course = course + math.copysign(0.5 * math.pi, signed_side)
-    ahead_corner = _offset_point(start, course, abs(signed_side))
-    far_corner = _offset_point(ahead_corner, cross_course, abs(signed_side))
-    cross_corner = _offset_point(start, cross_course, abs(signed_side))
-    return [ahead_corner, far_corner, cross_corner, start] * laps
 
 
 def _offset_point(point: MapPoint, course: float, distance: float) -> MapPoint:

@@ -349,8 +349,15 @@ class Search:
         first_path, certificate = path, None
         for extra_margin, corners_too, slope_margin in attempts:
             path = first_path if corners_too else path
-            if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
-                break
+            if slope_margin > 0.0:
+                # Such a margin helps only a path that violates the slope limits and nothing else, missiles' margins
+                # included.
+                if certificate is None or not certificate.slope < 0.0:
+                    break
+                other_margins = replace(certificate, slope=0.0).margins
+                keeps_distance = certificate.kill_distance >= self.required_distance
+                if not keeps_distance or not all(margin >= 0.0 for margin in other_margins):
+                    break
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
@@ -405,12 +412,6 @@ class Search:
             if self.keep_if_finished(path, certificate):
                 return True
         return False
-
-    def _violates_only_slopes(self, certificate: Certificate) -> bool:
-        """Return True if a path violates the slope limits and nothing else, missiles' margins included."""
-        keeps_distance = certificate.kill_distance >= self.required_distance
-        other_margins = replace(certificate, slope=0.0).margins
-        return certificate.slope < 0.0 and keeps_distance and all(margin >= 0.0 for margin in other_margins)
 
     def must_end(self) -> bool:
         """Return True if the search is stopped or its budget is exhausted, and record the reason."""

@@ -118,3 +118,12 @@ def test_a_dictionary_that_is_checked_is_not_changed() -> None:
     assert check_scenario(file.model_dump(mode="json", exclude_none=True), "x") == file
     with pytest.raises(ScenarioError, match="expected an object, got list"):
         check_scenario([1], "x")
+
+
+@pytest.mark.parametrize("key", ["height_m", "heights", "sigma_m"])
+def test_a_key_of_another_table_is_not_suggested(key: str, tmp_path: Path) -> None:
+    """`height_m` and `sigma_m` are keys of [[terrain.peak]], and not of [terrain]."""
+    text = refused(tmp_path, with_fault('kind = "flat"', f'kind = "flat"\n{key} = 500'))
+    assert f"terrain.{key}: unknown key" in text
+    assert "did you mean 'height_m'" not in text
+    assert "did you mean 'sigma_m'" not in text

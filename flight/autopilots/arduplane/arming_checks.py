@@ -81,23 +81,8 @@ def describe_failed_arming_checks(
         if not lowest <= trim <= highest:
             range_text = f"{name}_MIN {lowest:g} to {name}_MAX {highest:g}"
             yield f"{name}_TRIM {trim:g} prevents arming: ArduPlane requires {range_text}"
-    yield from _describe_radio_failsafe_faults(parameters, values)
-    for monitor in monitored_batteries(parameters):
-        yield from _describe_battery_faults(
-            values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
-        )
-    yield from _describe_fence_faults(parameters, values, mission)
-
-
-def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe a throttle failsafe that would trigger at idle throttle, and failsafe timeouts in the wrong order.
-
-    `Plane::rc_failsafe_active` takes a throttle pulse at or below THR_FS_VALUE (at or above it for a reversed channel)
-    as a lost radio. `AP_Arming::manual_transmitter_checks` fails if the pulse at idle is such a pulse.
-
-    parameters: ArduPlane's parameters.
-    values: value of every parameter by name; the default where no file states one.
-    """
+    # `Plane::rc_failsafe_active` takes a throttle pulse at or below THR_FS_VALUE (at or above it on a reversed channel)
+    # as a lost radio. `AP_Arming::manual_transmitter_checks` fails if the pulse at idle is such a pulse.
     channel, value = f"RC{values['RCMAP_THROTTLE']:g}", values["THR_FS_VALUE"]
     is_reversed = values.get(f"{channel}_REVERSED", 0.0) > 0.0
     end = "MAX" if is_reversed else "MIN"
@@ -111,6 +96,11 @@ def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Map
     if has_timeout and parameters.short_failsafe != _SHORT_FAILSAFE_OFF and long_timeout < short_timeout:
         limit_text = f"at least FS_SHORT_TIMEOUT {short_timeout:g}"
         yield f"FS_LONG_TIMEOUT {long_timeout:g} prevents arming: ArduPlane 4.6 requires {limit_text}"
+    for monitor in monitored_batteries(parameters):
+        yield from _describe_battery_faults(
+            values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
+        )
+    yield from _describe_fence_faults(parameters, values, mission)
 
 
 def _describe_battery_faults(

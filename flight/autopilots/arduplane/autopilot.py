@@ -311,14 +311,33 @@ class ArduPlane(Autopilot):
 
     @property
     def returns(self) -> ReturnBehaviour:
-        """Behaviour of ArduPlane in an RTL, from its parameters."""
+        """Behaviour of ArduPlane in an RTL, from its parameters.
+
+        >>> parameters = ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2)
+        >>> rules = ArduPlane(parameters).returns.rules
+        >>> rules.height, rules.initial_climb, rules.rally_limit, rules.landing_join
+        (nan, inf, 5000.0, 'straight')
+        """
         parameters = self.parameters
+        rules = ReturnRules(
+            height=math.nan if parameters.rtl_altitude < 0.0 else parameters.rtl_altitude,
+            radius=parameters.return_radius,
+            initial_climb=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
+            initial_climb_bank=min(parameters.level_roll_limit, parameters.roll_limit),
+            max_sink_rate=parameters.tecs_sink_max or math.inf,
+            min_slope_height=parameters.altitude_slope_min,
+            rally_limit=parameters.rally_limit,
+            includes_home=parameters.rally_includes_home > 0.0,
+            slope_to_stated_height=True,
+            landing_join=_LANDING_JOIN_BY_AUTOLAND.get(int(parameters.rtl_autoland), ""),
+            deviation_note=_RETURN_PATH_TEXT if int(parameters.rtl_autoland) == 4 else "",
+        )
         # RTL_CLIMB_MIN or FLIGHT_OPTIONS makes ArduPlane climb before it turns.
         options = float(int(parameters.flight_options) | CLIMB_BEFORE_TURN)
         climbs = [{"RTL_CLIMB_MIN": climb} for climb in _TRIED_CLIMBS_M]
         altitude = {"RTL_ALTITUDE": max(0.0, parameters.rtl_altitude)}
         return ReturnBehaviour(
-            self._return_rules,
+            rules,
             self._rtl_parameters,
             after_link_loss=partial(link_loss_reactions, parameters),
             fly=partial(fly_returns, parameters),
@@ -377,30 +396,6 @@ class ArduPlane(Autopilot):
         """
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
-
-    @property
-    def _return_rules(self) -> ReturnRules:
-        """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_* and the slope limits.
-
-        >>> parameters = ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2)
-        >>> rules = ArduPlane(parameters).returns.rules
-        >>> rules.height, rules.initial_climb, rules.rally_limit, rules.landing_join
-        (nan, inf, 5000.0, 'straight')
-        """
-        parameters = self.parameters
-        return ReturnRules(
-            height=math.nan if parameters.rtl_altitude < 0.0 else parameters.rtl_altitude,
-            radius=parameters.return_radius,
-            initial_climb=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
-            initial_climb_bank=min(parameters.level_roll_limit, parameters.roll_limit),
-            max_sink_rate=parameters.tecs_sink_max or math.inf,
-            min_slope_height=parameters.altitude_slope_min,
-            rally_limit=parameters.rally_limit,
-            includes_home=parameters.rally_includes_home > 0.0,
-            slope_to_stated_height=True,
-            landing_join=_LANDING_JOIN_BY_AUTOLAND.get(int(parameters.rtl_autoland), ""),
-            deviation_note=_RETURN_PATH_TEXT if int(parameters.rtl_autoland) == 4 else "",
-        )
 
     @property
     def loiters(self) -> LoiterRules:

@@ -61,7 +61,21 @@ def failsafe_causes(
         *_remote_control_causes(parameters),
         _station_cause(parameters),
     ]
-    causes += _battery_causes(parameters, has_landing_sequence=has_landing_sequence)
+    # A battery failsafe never reacts without a monitor, or without a threshold that the monitor can measure.
+    monitors = monitored_batteries(parameters)
+    for monitor in dict.fromkeys(["BATT", *monitors]):
+        number = "" if monitor == "BATT" else f" {monitor.removeprefix('BATT')}"
+        for level, name in (("LOW", "low"), ("CRT", "critical")):
+            parameter = f"{monitor}_FS_{level}_ACT"
+            value = int(parameters[parameter])
+            reaction = _BATTERY_FAILSAFE.get(value, "on")
+            if reaction == "land" and not has_landing_sequence:
+                reaction = "return"
+            has_voltage = parameters[f"{monitor}_{level}_VOLT"] > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0
+            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and measures_current(parameters, monitor)
+            if reaction != "on" and not (monitor in monitors and (has_voltage or has_charge)):
+                reaction = "never"
+            causes.append(Cause(f"battery{number} {name}", reaction, parameter, value))
     if has_fence:
         action = int(parameters.fence_action)
         if parameters.fence_enable > 0.0 or parameters.fence_auto_enable > 0.0:
@@ -130,30 +144,6 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
     ]
     last_cause = causes[-1]
     return tuple(reactions) or (LinkLossReaction("on", math.inf, last_cause.parameter, last_cause.value),)
-
-
-def _battery_causes(parameters: ArduPilotParameters, *, has_landing_sequence: bool) -> list[Cause]:
-    """Return ArduPlane's reactions to a low and to a critical battery, for each battery monitor that is on.
-
-    The reaction is "never" if there is no monitor, or no threshold that the monitor can measure.
-
-    has_landing_sequence: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
-    """
-    monitors, causes = monitored_batteries(parameters), []
-    for monitor in dict.fromkeys(["BATT", *monitors]):
-        number = "" if monitor == "BATT" else f" {monitor.removeprefix('BATT')}"
-        for level, name in (("LOW", "low"), ("CRT", "critical")):
-            parameter = f"{monitor}_FS_{level}_ACT"
-            value = int(parameters[parameter])
-            action = _BATTERY_FAILSAFE.get(value, "on")
-            if action == "land" and not has_landing_sequence:
-                action = "return"
-            has_voltage = parameters[f"{monitor}_{level}_VOLT"] > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0
-            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and measures_current(parameters, monitor)
-            if action != "on" and not (monitor in monitors and (has_voltage or has_charge)):
-                action = "never"
-            causes.append(Cause(f"battery{number} {name}", action, parameter, value))
-    return causes
 
 
 def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe, ...]:

@@ -125,11 +125,15 @@ def fly_go_arounds(
     (True, True, True)
     """
     results = np.zeros(len(starts), RETURN_RESULT)
-    record, climb = parameters.record(), _make_climb(parameters, end_altitude)
+    record, (climb, climb_parameters) = parameters.record(), _make_climb(parameters, end_altitude, pitch)
 
     def fly(k: int, landing: LandingStart) -> Floats:
         """Simulate go-around `k` to a landing sequence, fill its result, and return its positions, (t, 3) m."""
-        stages = np.concatenate([waypoint_ahead(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
+        # The sequence is flown up to its first loiter.
+        stops = truncate_at_first_loiter((landing, *landing.next_stops))
+        stages: Records = np.concatenate([waypoint_ahead(starts[k]), np.zeros(len(stops), WAYPOINT)])
+        for stage, stop in zip(stages[1:], stops, strict=True):
+            fill_stage(stage, stop, parameters)
         stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
         track = np.zeros((int(timeout) + 2, 3))
@@ -137,7 +141,7 @@ def fly_go_arounds(
             starts[k],
             stages,
             record,
-            _climb_parameters(parameters, pitch),
+            climb_parameters,
             climb,
             *aircraft.tables,
             environment.heights,
@@ -166,8 +170,10 @@ def fly_go_arounds(
     return GoArounds(results, tuple(track for track, _ in flights), tuple(landing for _, landing in flights))
 
 
-def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
-    """Return the `CLIMB` record of a go-around.
+def _make_climb(parameters: ArduPilotParameters, end_altitude: float, pitch: float) -> tuple[Record, Record]:
+    """Return the `CLIMB` record of a go-around, and the control parameters of its climb.
+
+    Both pitch limits of the climb are ``pitch`` (rad), and TECS_SPDWEIGHT is 2, so that pitch controls the airspeed.
 
     parameters: ArduPlane's parameters, which state the throttle of the climb and the rate at which it increases.
     end_altitude: altitude above which the climb ends, m AMSL.
@@ -175,25 +181,8 @@ def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
     climb: Record = np.zeros(1, CLIMB)[0]
     climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
-    return climb
-
-
-def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
-    """Return the control parameters of the climb, in which both pitch limits are ``pitch`` (rad).
-
-    TECS_SPDWEIGHT is 2, so that pitch controls the airspeed.
-    """
     climb_parameters = parameters.record()
     climb_parameters.tecs_speed_weight = 2.0
     climb_parameters.tecs_pitch_min = 0.0
     climb_parameters.pitch_limit_min = climb_parameters.pitch_limit_max = pitch
-    return climb_parameters
-
-
-def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """Return the stops of a landing sequence up to its first loiter, as n `WAYPOINT` records."""
-    stops = truncate_at_first_loiter(sequence)
-    stages: Records = np.zeros(len(stops), WAYPOINT)
-    for stage, stop in zip(stages, stops, strict=True):
-        fill_stage(stage, stop, parameters)
-    return stages
+    return climb, climb_parameters

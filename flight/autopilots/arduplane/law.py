@@ -154,25 +154,6 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
 
 
 @inner
-def _is_altitude_step(start_altitude: float, altitude_change: float, target: Record, parameters: Record) -> bool:
-    """Return True if the altitude demand jumps to the altitude of the leg's end instead of following a slope.
-
-    A descent follows a slope.  A climb is a step if FLIGHT_OPTIONS demands immediate climbs, and in 4.6 also if the
-    leg begins at a low height above home (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
-
-    start_altitude: altitude of the leg's start, m AMSL.
-    altitude_change: height of the leg's end above the aircraft, m.
-    target: the leg's end.
-    parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    """
-    if altitude_change < 0.0:
-        return False
-    if int(parameters.flight_options) & IMMEDIATE_CLIMB:
-        return True
-    return not parameters.is_4_7 and start_altitude - target.home_up <= parameters.climb_slope_height
-
-
-@inner
 def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
     """Return the altitude demand on a leg at the aircraft's position, m AMSL.
 
@@ -189,7 +170,11 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
     end_altitude: float = target.up
     if memory.sloped_leg != memory.leg + 1:
         memory.sloped_leg = memory.leg + 1
-        if _is_altitude_step(estimated.up, end_altitude - estimated.up, target, parameters):
+        # A descent follows a slope. A climb is a step if FLIGHT_OPTIONS demands immediate climbs, and in 4.6 also if
+        # the leg begins at a low height above home (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
+        begins_low = not parameters.is_4_7 and estimated.up - target.home_up <= parameters.climb_slope_height
+        is_step = begins_low or int(parameters.flight_options) & IMMEDIATE_CLIMB != 0
+        if end_altitude - estimated.up >= 0.0 and is_step:
             memory.from_up = end_altitude
     if memory.reached_loiter_target:
         return end_altitude

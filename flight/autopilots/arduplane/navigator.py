@@ -42,6 +42,8 @@ _INDECISION_ANGLE_RAD = 0.9 * math.pi
 _TARGET_BEHIND_ANGLE_RAD = math.radians(120.0)
 # Items closer than this have the same position, which ArduPlane stores in 1e-7 degrees, m.
 _SAME_PLACE_M = 0.01
+# Square of the length below which ArduPlane takes a leg as flown (`Location::line_path_proportion`), m².
+_SHORT_LEG_LENGTH_SQUARED_M2 = 0.001
 
 
 @compiled
@@ -68,7 +70,7 @@ def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_dis
 
 @inner
 def is_past_finish_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
-    """Return True if the aircraft is past the line across the end of a leg, or if the leg has no length.
+    """Return True if the aircraft is past the line across the end of a leg, or if the leg is shorter than 3 cm.
 
     Follows `Location::past_interval_finish_line`.
 
@@ -78,7 +80,8 @@ def is_past_finish_line(estimated: Record, from_east: float, from_north: float, 
     """
     leg_e, leg_n = east - from_east, north - from_north
     remaining_e, remaining_n = east - estimated.east, north - estimated.north
-    return remaining_e * leg_e + remaining_n * leg_n <= 0.0
+    is_short = leg_e * leg_e + leg_n * leg_n < _SHORT_LEG_LENGTH_SQUARED_M2
+    return is_short or remaining_e * leg_e + remaining_n * leg_n <= 0.0
 
 
 @inner
@@ -207,7 +210,7 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
     """Return the turn angle at the target that ArduPlane uses, rad, positive.
 
     Follows `Plane::setup_turn_angle`. The course of a leg that begins or ends on a loiter is measured from or to the
-    center of the loiter.
+    center of the loiter. A leg to an item that repeats the position of the item before it begins at the aircraft.
 
     waypoints: `WAYPOINT` records of the route, (w,).
     memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
@@ -215,11 +218,15 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
         return turn_angle
-    next_waypoint = waypoints[memory.leg + 2]
-    if next_waypoint.is_rtl or (waypoints[memory.leg].loiter_radius == 0.0 and next_waypoint.loiter_radius == 0.0):
-        return turn_angle
+    start, next_waypoint = waypoints[memory.leg], waypoints[memory.leg + 2]
     next_e, next_n = target_position(next_waypoint)
-    next_course = math.atan2(next_e - target.east, next_n - target.north)
+    is_next_here = (next_e - target.east) ** 2 + (next_n - target.north) ** 2 < _SHORT_LEG_LENGTH_SQUARED_M2
+    is_here_already = (target.east - start.east) ** 2 + (target.north - start.north) ** 2 < _SHORT_LEG_LENGTH_SQUARED_M2
+    has_loiter = start.loiter_radius != 0.0 or next_waypoint.loiter_radius != 0.0
+    if next_waypoint.is_rtl or not (has_loiter or is_next_here or is_here_already):
+        return turn_angle
+    # The bearing between two identical positions is east (`Location::get_bearing`).
+    next_course = 0.5 * math.pi if is_next_here else math.atan2(next_e - target.east, next_n - target.north)
     return abs(wrap(next_course - math.atan2(target.east - memory.from_east, target.north - memory.from_north)))
 
 

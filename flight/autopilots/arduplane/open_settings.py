@@ -187,7 +187,16 @@ def _describe_dependent_settings(
     parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
 ) -> Iterator[str]:
     """Describe settings whose effect depends on other settings, the mission or the aircraft."""
-    yield from _describe_airspeed_sensor(values)
+    # Without an airspeed sensor in use, the text says how such a flight can be judged. `AP_Airspeed::update` takes the
+    # first sensor if the primary one is missing.
+    primary = int(values["ARSPD_PRIMARY"]) + 1
+    prefixes = {number: f"ARSPD{number if number > 1 else ''}" for number in range(1, _AIRSPEED_SENSORS + 1)}
+    present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
+    if values["ARSPD_ENABLE"] == 0.0 or not present:
+        name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
+        yield f"{name} 0 leaves no airspeed sensor, which is not simulated; set {name} 1, and {_WITHOUT_SENSOR_TEXT}"
+    elif values[name := f"{prefixes[primary if primary in present else present[0]]}_USE"] != 1.0:
+        yield f"{name} {values[name]:g} affects the flight, but is not simulated; set {_WITHOUT_SENSOR_TEXT}"
     yield from _describe_position_estimate(values)
     yield from describe_failed_arming_checks(parameters, values, mission)
     yield from _describe_missing_outputs(parameters, values)
@@ -215,7 +224,18 @@ def _describe_dependent_settings(
         yield f"MIS_OPTIONS {values['MIS_OPTIONS']:g} continues the mission after its landing, which is not simulated"
     if by_program:
         return
-    yield from _describe_pitch_rates(parameters, values)
+    # Pitch rate limits that are too low for turns or for pitch changes: `AP_PitchController::get_servo_out` limits the
+    # sum of two rates, the rate that a turn needs, and the rate that changes the pitch.
+    bank = parameters.roll_limit
+    turn_rate = math.degrees(GRAVITY / parameters.airspeed_cruise * math.tan(min(bank, _MAX_COORDINATED_BANK_RAD)))
+    needed_rates = {
+        "PTCH2SRV_RMAX_UP": turn_rate * math.sin(bank) + _PITCH_CHANGE_RATE_DEGPS,
+        "PTCH2SRV_RMAX_DN": _PITCH_CHANGE_RATE_DEGPS,
+    }
+    for name, needed_rate in needed_rates.items():
+        if 0.0 < values[name] < needed_rate:
+            rate_text = f"is below the {needed_rate:.3g} deg/s that the flight needs"
+            yield f"{name} {values[name]:g} {rate_text}, which is not simulated"
     for airspeed in mission.throttled_airspeeds:
         if not parameters.airspeed_min <= airspeed <= parameters.airspeed_max:
             # `Plane::do_change_speed` falls through to the throttle.
@@ -239,23 +259,6 @@ def _describe_dependent_settings(
         yield f"{settings_text} reverse the thrust, which is not simulated"
     if mission.returns and mission.has_return_path and parameters.rtl_autoland == _BY_RETURN_PATH:
         yield "RTL_AUTOLAND 4 returns along the mission's return path, which is not simulated"
-
-
-def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe settings without which no airspeed is measured or used, and how such a flight can be judged.
-
-    `AP_Airspeed::update` takes the first sensor if the primary one is missing.
-    """
-    primary = int(values["ARSPD_PRIMARY"]) + 1
-    prefixes = {number: f"ARSPD{number if number > 1 else ''}" for number in range(1, _AIRSPEED_SENSORS + 1)}
-    present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
-    if values["ARSPD_ENABLE"] == 0.0 or not present:
-        name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
-        yield f"{name} 0 leaves no airspeed sensor, which is not simulated; set {name} 1, and {_WITHOUT_SENSOR_TEXT}"
-        return
-    use_name = f"{prefixes[primary if primary in present else present[0]]}_USE"
-    if values[use_name] != 1.0:
-        yield f"{use_name} {values[use_name]:g} affects the flight, but is not simulated; set {_WITHOUT_SENSOR_TEXT}"
 
 
 def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
@@ -297,29 +300,6 @@ def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[s
     for part, moving in _FUNCTIONS_BY_PART.items():
         if functions.isdisjoint(moving):
             yield f"{names} move no {part}, which is not simulated"
-
-
-def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe pitch rate limits that are too low for turns or for pitch changes.
-
-    `AP_PitchController::get_servo_out` limits the sum of two rates: the rate that a turn needs, and the rate that
-    changes the pitch.
-
-    parameters: ArduPlane's parameters.
-    values: value of every parameter by name; the default where no file states one.
-    """
-    bank = parameters.roll_limit
-    turn_rate = math.degrees(GRAVITY / parameters.airspeed_cruise * math.tan(min(bank, _MAX_COORDINATED_BANK_RAD)))
-    needed_rates = {
-        "PTCH2SRV_RMAX_UP": turn_rate * math.sin(bank) + _PITCH_CHANGE_RATE_DEGPS,
-        "PTCH2SRV_RMAX_DN": _PITCH_CHANGE_RATE_DEGPS,
-    }
-    for name, needed_rate in needed_rates.items():
-        if 0.0 < values[name] < needed_rate:
-            yield (
-                f"{name} {values[name]:g} is below the {needed_rate:.3g} deg/s that the flight needs, which is not"
-                " simulated"
-            )
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:

@@ -291,8 +291,10 @@ def fly_stages(
         eas2tas, is_last = eas_to_tas_ratio(estimated.up), stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
-        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
-            _record_arrival(estimated, time, engine_out, result)
+        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius) and math.isnan(result.arrival_time):
+            result.arrival_time, result.arrival_altitude = time, estimated.up
+            # Without an engine the aircraft descends in circles there.
+            result.outcome = RETURN_ARRIVED if engine_out else result.outcome
         update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
         if result.outcome != RETURN_TIMEOUT:
             break
@@ -337,22 +339,6 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
         1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
         1.0 - math.exp(-dt / PATH_LAG_S),
     )
-
-
-@inner
-def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
-    """Record time and altitude of the first arrival at the loiter; after an engine failure, end the RTL there.
-
-    estimated: position over the ground, a `MOTION` record.
-    time: time since the start of the RTL, s.
-    engine_out: True after an engine failure.
-    result: `RETURN_RESULT` record; updated at the first arrival only.
-    """
-    if math.isnan(result.arrival_time):
-        result.arrival_time, result.arrival_altitude = time, estimated.up
-        if engine_out:
-            # Without an engine the aircraft descends in circles there.
-            result.outcome = RETURN_ARRIVED
 
 
 @inner

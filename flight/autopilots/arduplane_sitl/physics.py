@@ -124,7 +124,14 @@ class PhysicsPort:
         """
         waiting_since = 0.0
         while True:
-            data = self._next_datagram()
+            # b"" if no datagram arrives within `_CHECK_INTERVAL_S`.
+            try:
+                data, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
+                if not self._connected:
+                    self._socket.connect(sender)
+                    self._connected = True
+            except (BlockingIOError, ConnectionRefusedError):
+                data = b""
             if data:
                 packet = parse_servo_packet(data)
                 if packet.frame > self._frame:
@@ -158,18 +165,6 @@ class PhysicsPort:
         self._last_answer = data
         self._answered = self._clock()
         self._send(data)
-
-    def _next_datagram(self) -> bytes:
-        """Return the next datagram; b"" if none arrives within `_CHECK_INTERVAL_S`."""
-        try:
-            if self._connected:
-                return self._socket.recv(_MAX_DATAGRAM_BYTES)
-            data, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
-        except (BlockingIOError, ConnectionRefusedError):
-            return b""
-        self._socket.connect(sender)
-        self._connected = True
-        return data
 
     def _send(self, data: bytes) -> None:
         """Send bytes to the program, if there are any."""

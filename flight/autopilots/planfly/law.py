@@ -175,9 +175,42 @@ def guide(
     course = find_on_path(estimated, pieces, memory)
     memory.speed_command = waypoints[memory.leg].airspeed
     if memory.lateral_law == L1:
-        bank = _l1_bank_command(state, estimated, waypoints, gains, memory, dt)
+        # The next leg begins once L1 has reached the waypoint.
+        speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+        damping = gains.l1_damping
+        l1_distance = l1_length(speed, gains.l1_period, damping)
+        leg = memory.l1_leg
+        start, end = waypoints[leg], waypoints[leg + 1]
+        turn_distance = end.acceptance if end.acceptance > 0.0 else DEFAULT_ACCEPTANCE_RADIUS_M
+        if leg + 2 < waypoints.shape[0] and has_reached_leg_end(estimated, start, end, l1_distance, turn_distance):
+            leg += 1
+            memory.l1_leg = leg
+        start, end = waypoints[leg], waypoints[leg + 1]
+        velocity_angle, aim_angle = l1_angles(estimated, start.east, start.north, end.east, end.north, l1_distance)
+        memory.l1_integrator = l1_integrate(aim_angle, memory.l1_integrator, gains.l1_integral, dt)
+        if not math.isnan(aim_angle):
+            velocity_angle += aim_angle + memory.l1_integrator
+        pitch = min(1.0, max(-1.0, state.pitch))
+        acceleration = l1_acceleration(velocity_angle, speed, l1_distance, damping)
+        bank_demand = math.atan(acceleration / (GRAVITY * math.cos(pitch)))
+        bank = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     elif memory.lateral_law == VECTOR_FIELD:
-        bank = _field_bank_command(estimated, pieces[memory.piece].curvature, gains, memory, course, dt)
+        # The bank for the arc plus a PI law on the course error, whose integrator is frozen at the bank limit.
+        speed, curvature = math.hypot(estimated.velocity_east, estimated.velocity_north), pieces[memory.piece].curvature
+        course_demand = field_course(
+            course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
+        )
+        course_error = wrap(course_demand - math.atan2(estimated.velocity_east, estimated.velocity_north))
+        bank_demand = (
+            math.atan(speed * speed * curvature / GRAVITY)
+            + gains.field_course * course_error
+            + gains.field_course_integral * memory.course_integrator
+        )
+        bank = min(memory.max_bank, max(-memory.max_bank, bank_demand))
+        if bank == bank_demand:
+            memory.course_integrator = min(
+                _MAX_COURSE_INTEGRAL, max(-_MAX_COURSE_INTEGRAL, memory.course_integrator + course_error * dt)
+            )
     else:
         bank = _cross_track_bank_command(state, estimated, pieces, gains, memory, course, dt)
     follow_altitude_profile(state, estimated, nodes, gains, memory, commands, course, dt)
@@ -229,7 +262,14 @@ def _cross_track_bank_command(
     correction += offset_correction + gains.push_lead * min(1.0, (FULL_LEAD_TICK_S / dt) ** 2) * correction_rate
     lift_acceleration = GRAVITY + memory.slope_acceleration
     bank_demand = math.atan((turn_acceleration + correction) / (lift_acceleration * crab))
-    bank_demand = _limit_bank_by_nose_angle(bank_demand, wrap(state.yaw - course), memory.max_bank)
+    # Do not turn the nose too far from the course: at `_NOSE_LIMIT_RAD` it is almost perpendicular to the course, and
+    # turning further would not help against a crosswind; the aircraft would turn through 360 degrees. The result is
+    # continuous in both angles unless the nose points straight back. A bank that already turns the nose back towards
+    # the course fast enough is not changed.
+    nose_angle = wrap(state.yaw - course)
+    side = math.copysign(1.0, nose_angle)
+    nose_limit = max(-memory.max_bank, _BANK_PER_NOSE_ANGLE_RATIO * (_NOSE_LIMIT_RAD - abs(nose_angle)))
+    bank_demand = side * min(side * bank_demand, nose_limit)
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     max_path_curvature = max_curvature(pieces, piece, distance, distance + speed * gains.arc_slowing_time)
     memory.max_arc_speed = math.sqrt(
@@ -245,22 +285,6 @@ def _cross_track_bank_command(
             max(-_MAX_CROSS_TRACK_INTEGRAL, memory.cross_track_integrator + memory.cross_track * dt),
         )
     return bank
-
-
-@inner
-def _limit_bank_by_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
-    """Return the bank demand, reduced if it would turn the nose too far from the course, rad.
-
-    At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course. Turning further would not help against a
-    crosswind; the aircraft would turn through 360 degrees. The result is continuous in both angles unless the nose
-    points straight back. A bank is not changed if it already turns the nose back towards the course fast enough.
-
-    nose_angle: angle from the course to the nose, positive clockwise, within +-pi rad.
-    max_bank: rad.
-    """
-    side = math.copysign(1.0, nose_angle)
-    limit = max(-max_bank, _BANK_PER_NOSE_ANGLE_RATIO * (_NOSE_LIMIT_RAD - abs(nose_angle)))
-    return side * min(side * bank_demand, limit)
 
 
 @inner
@@ -331,36 +355,8 @@ def _lateral_correction(
     cross_track_rate = math.copysign(speed, course_error) if is_flying_away else speed * math.sin(course_error)
     correction: float = rate_gain * (cross_track_rate_demand - (cross_track_rate - memory.roll_offset_rate))
     correction -= gains.cross_track_integral * memory.cross_track_integrator
-    correction -= gains.side_gain * _unexplained_acceleration(state, estimated, gains, memory, speed, crab, dt)
-    return correction
-
-
-@inner
-def _pressure_ratio(state: Record, gains: Record) -> float:
-    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed.
-
-    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    gains: gains of the control law and of the aircraft, a `GAINS` record.
-    """
-    return (state.airspeed / gains.reference_airspeed) ** 2
-
-
-@inner
-def _unexplained_acceleration(
-    state: Record, estimated: Record, gains: Record, memory: Record, speed: float, crab: float, dt: float
-) -> float:
-    """Return the smoothed acceleration to the right that is caused neither by lift nor by ailerons, m/s^2.
-
-    The estimate starts at the second tick, because it needs the previous velocity.
-
-    state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    gains: gains of the inner loops, a `GAINS` record.
-    memory: `GUIDANCE_MEMORY` record; the estimate and the last velocity are stored in it.
-    speed: ground speed, m/s.
-    crab: cosine of the angle between heading and ground course.
-    dt: duration of a tick, s.
-    """
+    # The smoothed acceleration to the right that neither lift nor ailerons cause, m/s^2. The estimate starts at the
+    # second tick, because it needs the previous velocity.
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         change_east = estimated.velocity_east - memory.last_velocity_east
         change_north = estimated.velocity_north - memory.last_velocity_north
@@ -372,71 +368,18 @@ def _unexplained_acceleration(
     memory.last_velocity_east = estimated.velocity_east
     memory.last_velocity_north = estimated.velocity_north
     memory.last_velocity_up = estimated.velocity_up
-    return memory.unexplained_acceleration
+    correction -= gains.side_gain * memory.unexplained_acceleration
+    return correction
 
 
 @inner
-def _l1_bank_command(
-    state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
-) -> float:
-    """Return the bank command of L1 (rad); begin the next leg once L1 has reached the waypoint.
+def _pressure_ratio(state: Record, gains: Record) -> float:
+    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed.
 
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    waypoints: `WAYPOINT` records of the route, (w,).
-    gains: gains of the inner loops, a `GAINS` record.
-    memory: `GUIDANCE_MEMORY` record; its leg and integrator of L1 are updated.
-    dt: duration of a tick, s.
+    gains: gains of the control law and of the aircraft, a `GAINS` record.
     """
-    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    damping = gains.l1_damping
-    l1_distance = l1_length(speed, gains.l1_period, damping)
-    leg = memory.l1_leg
-    start, end = waypoints[leg], waypoints[leg + 1]
-    turn_distance = end.acceptance if end.acceptance > 0.0 else DEFAULT_ACCEPTANCE_RADIUS_M
-    if leg + 2 < waypoints.shape[0] and has_reached_leg_end(estimated, start, end, l1_distance, turn_distance):
-        leg += 1
-        memory.l1_leg = leg
-    start, end = waypoints[leg], waypoints[leg + 1]
-    velocity_angle, aim_angle = l1_angles(estimated, start.east, start.north, end.east, end.north, l1_distance)
-    memory.l1_integrator = l1_integrate(aim_angle, memory.l1_integrator, gains.l1_integral, dt)
-    if not math.isnan(aim_angle):
-        velocity_angle += aim_angle + memory.l1_integrator
-    pitch = min(1.0, max(-1.0, state.pitch))
-    bank_demand = math.atan(l1_acceleration(velocity_angle, speed, l1_distance, damping) / (GRAVITY * math.cos(pitch)))
-    return min(memory.max_bank, max(-memory.max_bank, bank_demand))
-
-
-@inner
-def _field_bank_command(
-    estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
-) -> float:
-    """Return the bank command of the vector field, rad.
-
-    The command is the bank for the arc plus a PI law on the course error. The integrator is frozen at the bank limit.
-
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    curvature: curvature of the path at the aircraft, 1/m.
-    gains: gains of the inner loops, a `GAINS` record.
-    memory: `GUIDANCE_MEMORY` record; its integrator of the course error is updated.
-    course: course of the path at the aircraft, rad.
-    dt: duration of a tick, s.
-    """
-    speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    course_demand = field_course(
-        course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
-    )
-    course_error = wrap(course_demand - math.atan2(estimated.velocity_east, estimated.velocity_north))
-    orbit_bank = math.atan(speed * speed * curvature / GRAVITY)
-    bank_demand = (
-        orbit_bank + gains.field_course * course_error + gains.field_course_integral * memory.course_integrator
-    )
-    bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
-    if bank == bank_demand:
-        memory.course_integrator = min(
-            _MAX_COURSE_INTEGRAL, max(-_MAX_COURSE_INTEGRAL, memory.course_integrator + course_error * dt)
-        )
-    return bank
+    return (state.airspeed / gains.reference_airspeed) ** 2
 
 
 @inner
@@ -491,7 +434,22 @@ def follow_altitude_profile(
             _MAX_ALTITUDE_INTEGRAL, max(-_MAX_ALTITUDE_INTEGRAL, memory.altitude_integrator + height_error * dt)
         )
     steer_elevator(state, gains, memory, commands, climb_rate, acceleration_demand)
-    _set_throttle(estimated, gains, memory, commands, airspeed, slope_ahead, speed_along, dt)
+    # The throttle: a feed-forward from the trim of level flight and the slope ahead, and a PI feedback of the airspeed
+    # error. In and before an arc the ground speed is limited as well, as far as the airspeed allows.
+    airspeed_error = memory.speed_command - airspeed
+    if memory.max_arc_speed > 0.0:
+        ground_speed_excess = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.max_arc_speed
+        airspeed_error = min(airspeed_error, max(-ground_speed_excess, airspeed_error - gains.arc_slowing_max))
+    feed_forward = memory.trim_throttle + gains.throttle_per_slope * slope_ahead * speed_along / airspeed
+    throttle_demand = feed_forward + gains.speed_gain * airspeed_error + gains.speed_integral * memory.speed_integrator
+    commands.throttle = min(1.0, max(0.0, throttle_demand))
+    # The integrator is frozen while the throttle is saturated. Below the throttle at which thrust begins, which
+    # increases with airspeed, it would wind up.
+    idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
+    if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
+        memory.speed_integrator = min(
+            _MAX_SPEED_INTEGRAL_M, max(-_MAX_SPEED_INTEGRAL_M, memory.speed_integrator + airspeed_error * dt)
+        )
 
 
 @inner
@@ -542,47 +500,6 @@ def _max_upward_acceleration(
         memory.energy_height_rate + unused_climb + airspeed_excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
     )
     return rate_gain * (max_climb_rate - climb_rate)
-
-
-@inner
-def _set_throttle(
-    estimated: Record,
-    gains: Record,
-    memory: Record,
-    commands: Record,
-    airspeed: float,
-    slope_ahead: float,
-    speed_along: float,
-    dt: float,
-) -> None:
-    """Set the throttle from the trim of level flight, the slope ahead and the airspeed error.
-
-    The slope ahead gives a feed-forward, the airspeed error a PI feedback. Before and in an arc that requires a lower
-    ground speed, the airspeed error is reduced. The integrator is frozen while the throttle is saturated.
-
-    estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    gains: gains of the inner loops, a `GAINS` record.
-    memory: `GUIDANCE_MEMORY` record; its integrator of the airspeed error is updated.
-    commands: `COMMANDS` record, whose throttle is set.
-    airspeed: m/s.
-    slope_ahead: slope of the altitude profile ahead, m per m.
-    speed_along: ground speed along the path, m/s.
-    dt: duration of a tick, s.
-    """
-    airspeed_error = memory.speed_command - airspeed
-    if memory.max_arc_speed > 0.0:
-        # In and before an arc also limit the ground speed, as far as the airspeed allows.
-        ground_speed_excess = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.max_arc_speed
-        airspeed_error = min(airspeed_error, max(-ground_speed_excess, airspeed_error - gains.arc_slowing_max))
-    feed_forward = memory.trim_throttle + gains.throttle_per_slope * slope_ahead * speed_along / airspeed
-    throttle_demand = feed_forward + gains.speed_gain * airspeed_error + gains.speed_integral * memory.speed_integrator
-    commands.throttle = min(1.0, max(0.0, throttle_demand))
-    # Below the throttle at which thrust begins, which increases with airspeed, the integrator would wind up.
-    idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
-    if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
-        memory.speed_integrator = min(
-            _MAX_SPEED_INTEGRAL_M, max(-_MAX_SPEED_INTEGRAL_M, memory.speed_integrator + airspeed_error * dt)
-        )
 
 
 @inner

@@ -261,12 +261,32 @@ class Px4(Autopilot):
                     capacity=capacity,
                 )
             battery_failsafes = (failsafe,)
-        is_stated = parameters.is_complete_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
+        # The failsafe on the remaining flight time (`rtlEstimateCheck`). PX4 knows this time only if a battery capacity
+        # is set.
+        return_time_failsafe = None
+        file_values = parameters.by_origin("file")
+        action = file_values.get("COM_FLTT_LOW_ACT", _RETURN_IN_TIME_DEFAULT[parameters.version])
+        if action == _RETURN_IN_TIME and parameters["BAT1_CAPACITY"] > 0.0:
+            return_time_failsafe = ReturnTimeFailsafe(
+                f"COM_FLTT_LOW_ACT {action:g}",
+                remedy="COM_FLTT_LOW_ACT 0, or a larger battery (BAT1_CAPACITY), avoids it",
+                capacity=parameters["BAT1_CAPACITY"],
+                initial_current=parameters["BAT_AVRG_CURRENT"],
+                time_factor=parameters["RTL_TIME_FACTOR"],
+                time_margin=parameters["RTL_TIME_MARGIN"],
+                airspeed=parameters["FW_AIRSPD_TRIM"],
+                climb_rate=parameters["FW_T_CLMB_R_SP"],
+                sink_rate=parameters["FW_T_SINK_R_SP"],
+                altitude=parameters["RTL_RETURN_ALT"],
+                delay=max(0.0, parameters["RTL_LAND_DELAY"]),
+                follows_mission=parameters["RTL_TYPE"] in _ALONG_THE_MISSION,
+            )
+        is_stated = parameters.is_complete_set or "MIS_TKO_LAND_REQ" in file_values
         return MissionChecks(
             dialect="px4",
             feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
             battery_failsafes=battery_failsafes,
-            return_time_failsafe=self._return_time_failsafe(),
+            return_time_failsafe=return_time_failsafe,
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
             parameter_notes=parameters.notes,
         )
@@ -304,30 +324,29 @@ class Px4(Autopilot):
                 if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6)
             ]
         changing_texts += describe_open_settings(parameters, mission.aircraft, by_program=by_program)
-        return [*ending_texts, *changing_texts, *([] if by_program else self._describe_mission_settings(mission))]
-
-    def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
-        """Describe settings that matter only for some missions or releases."""
-        parameters = self.parameters
+        texts = [*ending_texts, *changing_texts]
+        if by_program:
+            return texts
+        # Settings that matter only for some missions or releases.
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
-            yield "NPFG_EN_MIN_GSP 0 disables the minimum ground speed, which is not simulated"
+            texts.append("NPFG_EN_MIN_GSP 0 disables the minimum ground speed, which is not simulated")
         if mission.moves_payload and parameters["MIS_COMMAND_TOUT"] > 0.0:
             wait_text = f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} s"
-            yield f"{wait_text} makes PX4 wait for the payload, which is not simulated"
+            texts.append(f"{wait_text} makes PX4 wait for the payload, which is not simulated")
         if parameters["FW_T_THR_LOW_HGT"] >= 0.0 and parameters["FW_LND_THRTC_SC"] != 1.0:
             scale_text = f"FW_LND_THRTC_SC {parameters['FW_LND_THRTC_SC']:g}"
             height_text = f"FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m"
-            yield f"{scale_text} changes the altitude control below {height_text}, which is not simulated"
+            texts.append(f"{scale_text} changes the altitude control below {height_text}, which is not simulated")
         if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
-            yield "FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated"
-        if not mission.returns:
-            return
-        yield from self._unsimulated_return_texts(mission.rally_distance)
-        if parameters["RTL_TYPE"] in _TO_LANDING and not mission.commands.isdisjoint(
-            (*LANDINGS, Command.DO_LAND_START)
-        ):
-            yield f"RTL_TYPE {parameters['RTL_TYPE']:g} may return to the mission's landing, which is not simulated"
-        yield from self._unjudged_return_texts(mission.rally_distance)
+            texts.append("FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated")
+        if mission.returns:
+            texts += self._unsimulated_return_texts(mission.rally_distance)
+            return_type, landing_commands = parameters["RTL_TYPE"], (*LANDINGS, Command.DO_LAND_START)
+            if return_type in _TO_LANDING and not mission.commands.isdisjoint(landing_commands):
+                landing_text = "may return to the mission's landing, which is not simulated"
+                texts.append(f"RTL_TYPE {return_type:g} {landing_text}")
+            texts += self._unjudged_return_texts(mission.rally_distance)
+        return texts
 
     def _unsimulated_return_texts(self, rally_distance: float) -> Iterator[str]:
         """Describe a value of RTL_TYPE for which no RTL is simulated.
@@ -350,31 +369,6 @@ class Px4(Autopilot):
             yield "PX4 ignores a rally point within 10 m of home, but the simulated return goes to it"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
-
-    def _return_time_failsafe(self) -> ReturnTimeFailsafe | None:
-        """Return the failsafe on the remaining flight time (`rtlEstimateCheck`); None if PX4 does not react.
-
-        PX4 knows the remaining time only if a battery capacity is set.
-        """
-        parameters = self.parameters
-        default = _RETURN_IN_TIME_DEFAULT[parameters.version]
-        action = parameters.by_origin("file").get("COM_FLTT_LOW_ACT", default)
-        if action != _RETURN_IN_TIME or not parameters["BAT1_CAPACITY"] > 0.0:
-            return None
-        return ReturnTimeFailsafe(
-            f"COM_FLTT_LOW_ACT {action:g}",
-            remedy="COM_FLTT_LOW_ACT 0, or a larger battery (BAT1_CAPACITY), avoids it",
-            capacity=parameters["BAT1_CAPACITY"],
-            initial_current=parameters["BAT_AVRG_CURRENT"],
-            time_factor=parameters["RTL_TIME_FACTOR"],
-            time_margin=parameters["RTL_TIME_MARGIN"],
-            airspeed=parameters["FW_AIRSPD_TRIM"],
-            climb_rate=parameters["FW_T_CLMB_R_SP"],
-            sink_rate=parameters["FW_T_SINK_R_SP"],
-            altitude=parameters["RTL_RETURN_ALT"],
-            delay=max(0.0, parameters["RTL_LAND_DELAY"]),
-            follows_mission=parameters["RTL_TYPE"] in _ALONG_THE_MISSION,
-        )
 
     @property
     def turns(self) -> TurnRules:
@@ -446,8 +440,30 @@ class Px4(Autopilot):
 
     @property
     def returns(self) -> ReturnBehaviour:
-        """Behaviour of PX4 in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
+        """Behaviour of PX4 in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT.
+
+        >>> rules = Px4(Px4Parameters.defaults()).returns.rules
+        >>> rules.includes_home, rules.transit_height, rules.rally_height, rules.deviation_note
+        (False, 100.0, 100.0, '')
+        """
         parameters = self.parameters
+        # The rules are for an RTL that starts at any distance. Both altitudes are heights above the destination, which
+        # is home or a rally point. Follows PX4's `src/modules/navigator/rtl.cpp`. RTL_TYPE 0 returns to the nearest of
+        # home and the rally points; 1 (the default of fixed wings) and 5 return to the nearest rally point, or to home
+        # without a rally point. Type 1 and all other types also use the landing of a mission. If the RTL is an item of
+        # the mission itself, an RTL to that landing is not simulated.
+        rules = ReturnRules(
+            height=parameters["RTL_DESCEND_ALT"],
+            radius=parameters["RTL_LOITER_RAD"],
+            max_sink_rate=parameters["FW_T_SINK_R_SP"],
+            rally_limit=0.0,
+            includes_home=int(parameters["RTL_TYPE"]) in (0, 3),
+            holds_height=True,
+            transit_height=parameters["RTL_RETURN_ALT"],
+            rally_height=parameters["RTL_DESCEND_ALT"],
+            may_use_landing=int(parameters["RTL_TYPE"]) in (1, 3),
+            deviation_note=_RTL_TYPES_NOT_FLOWN.get(int(parameters["RTL_TYPE"]), ""),
+        )
         return_altitude, descend_altitude = ({name: parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
         return_type = parameters["RTL_TYPE"]
         other_types = sorted({0.0, 1.0, 3.0} - {return_type})
@@ -460,7 +476,7 @@ class Px4(Autopilot):
             f" descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
         return ReturnBehaviour(
-            self._return_rules,
+            rules,
             lambda settings: {} if settings.altitude is None else {"RTL_RETURN_ALT": settings.altitude},
             after_link_loss=partial(link_loss_reactions, self.parameters),
             fly=partial(fly_returns, parameters),
@@ -491,35 +507,6 @@ class Px4(Autopilot):
         is_unknown = return_type in _TO_LANDING and not has_sequence and not mission.commands.isdisjoint(LANDINGS)
         landing_text = f"RTL_TYPE {return_type:g} may return to a landing without DO_LAND_START, which is not simulated"
         return (*([landing_text] if is_unknown else []), *self._unjudged_return_texts(mission.rally_distance))
-
-    @property
-    def _return_rules(self) -> ReturnRules:
-        """Rules of an RTL from RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_LOITER_RAD and RTL_TYPE.
-
-        The rules are for an RTL that starts at any distance. Both altitudes are heights above the destination, which is
-        home or a rally point. Follows PX4's `src/modules/navigator/rtl.cpp`. RTL_TYPE 0 returns to the nearest of home
-        and the rally points; 1 (the default of fixed wings) and 5 return to the nearest rally point, or to home without
-        a rally point. Type 1 and all other types also use the landing of a mission. If the RTL is an item of the
-        mission itself, an RTL to that landing is not simulated.
-
-        >>> rules = Px4(Px4Parameters.defaults()).returns.rules
-        >>> rules.includes_home, rules.transit_height, rules.rally_height, rules.deviation_note
-        (False, 100.0, 100.0, '')
-        """
-        parameters = self.parameters
-        return_type = int(parameters["RTL_TYPE"])
-        return ReturnRules(
-            height=parameters["RTL_DESCEND_ALT"],
-            radius=parameters["RTL_LOITER_RAD"],
-            max_sink_rate=parameters["FW_T_SINK_R_SP"],
-            rally_limit=0.0,
-            includes_home=return_type in (0, 3),
-            holds_height=True,
-            transit_height=parameters["RTL_RETURN_ALT"],
-            rally_height=parameters["RTL_DESCEND_ALT"],
-            may_use_landing=return_type in (1, 3),
-            deviation_note=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
-        )
 
     @property
     def loiters(self) -> LoiterRules:

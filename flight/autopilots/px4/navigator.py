@@ -264,7 +264,17 @@ def _navigate_loiter(
         exit_index += 1
     if exit_index >= waypoints.shape[0] or memory.time_since_reached <= loiter.loiter_time + SWITCH_DELAY_S:
         return
-    if not loiter.exits_on_course or _is_on_exit_course(estimated, waypoints[exit_index], loiter):
+    # A loiter may be left only on the course to the next waypoint, unless this waypoint is so close to the loiter's
+    # center that the course never points to it.
+    next_east, next_north = _setpoint_position(waypoints[exit_index])
+    next_distance = math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north)
+    bearing = math.atan2(next_east - estimated.east, next_north - estimated.north)
+    course_error = abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north)))
+    if (
+        not loiter.exits_on_course
+        or next_distance <= _MIN_EXIT_DISTANCE_RATIO * abs(loiter.loiter_radius)
+        or course_error < EXIT_COURSE_TOLERANCE_RAD
+    ):
         begin_leg(estimated, waypoints, exit_index - 1, memory)
 
 
@@ -288,25 +298,6 @@ def _setpoint_position(waypoint: Record) -> tuple[float, float]:
         if waypoint.loiter_radius != 0.0
         else (waypoint.east, waypoint.north)
     )
-
-
-@inner
-def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record) -> bool:
-    """Return True if the ground course points to the waypoint after a loiter.
-
-    The tolerance is `EXIT_COURSE_TOLERANCE_RAD`. The result is also True if the waypoint is so close to the loiter's
-    center that the course never points to it.
-
-    estimated: estimated position and velocity over the ground, a `MOTION` record.
-    """
-    next_east, next_north = _setpoint_position(next_waypoint)
-    if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
-        loiter.loiter_radius
-    ):
-        return True
-    bearing = math.atan2(next_east - estimated.east, next_north - estimated.north)
-    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    return abs(wrap(bearing - course)) < EXIT_COURSE_TOLERANCE_RAD
 
 
 @inner

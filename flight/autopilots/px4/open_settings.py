@@ -63,18 +63,33 @@ def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None,
         yield f"EKF2_GPS_CTRL {gps_bits} without a barometer leaves no altitude, which is not simulated"
     if not any(parameters[name] for name in _GPS_CONNECTIONS):
         yield "GPS_1_CONFIG 0 connects no GPS, which is not simulated"
-    yield from _describe_control_allocation(parameters)
-    # Slew rate limits are given in s for the whole range (`ControlAllocation::applySlewRateLimit`).
+    # A control allocation of the file that is for another airframe, or lacks ailerons, elevator or motor. Parameters
+    # without control allocation (SYS_CTRL_ALLOC 0) state no airframe.
     file_values = parameters.by_origin("file")
+    if parameters["CA_AIRFRAME"] != _FIXED_WING:
+        if "CA_AIRFRAME" in file_values and parameters["SYS_CTRL_ALLOC"] != 0.0:
+            yield f"CA_AIRFRAME {parameters['CA_AIRFRAME']:g} is not a fixed wing, which is not simulated"
+    else:
+        if file_values.get("CA_ROTOR_COUNT", 1.0) == 0.0:
+            yield "CA_ROTOR_COUNT 0 leaves no motor, which is not simulated"
+        surfaces = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(file_values.get("CA_SV_CS_COUNT", 0.0)))]
+        if "CA_SV_CS_COUNT" in file_values and file_values.keys() >= set(surfaces):
+            for part, types in _SURFACES_BY_PART.items():
+                torque = _TORQUE_BY_PART[part]
+                moved_types = {
+                    file_values[name] for name in surfaces if file_values.get(name.replace("TYPE", torque), 1.0) != 0.0
+                }
+                if moved_types.isdisjoint(types):
+                    yield f"CA_SV_CS_COUNT {len(surfaces)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
+    # Slew rate limits are given in s for the whole range (`ControlAllocation::applySlewRateLimit`).
     for name in SLEW_NAMES:
         if (value := file_values.get(name, 0.0)) > 0.0:
             yield f"{name} {value:g} s slows an actuator output, which is not simulated"
     # Output functions that connect no motor or no control surface.
     functions = {file_values[name] for name in OUTPUT_FUNCTION_NAMES if name in file_values}
-    if functions:
-        for part, (first_function, last_function) in _OUTPUT_FUNCTIONS_BY_PART.items():
-            if not any(first_function <= function <= last_function for function in functions):
-                yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
+    for part, (first_function, last_function) in _OUTPUT_FUNCTIONS_BY_PART.items():
+        if functions and not any(first_function <= function <= last_function for function in functions):
+            yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
     if not by_program:
         # Gains of the user's file that are too low or too high to control the attitude. The gains in the aircraft's
         # file for ArduPlane, and PX4's defaults, are assumed to suit the aircraft.
@@ -94,30 +109,6 @@ def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None,
             if fault:
                 gains_text = ", ".join(f"{name} {parameters[name]:g}" for name in [*names, time_constant])
                 yield f"{gains_text}: these gains are {fault} to hold the attitude, which is not simulated"
-
-
-def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe a control allocation of the file that does not suit a fixed wing.
-
-    It is for another airframe, or it lacks ailerons, elevator or motor. Parameters without control allocation
-    (SYS_CTRL_ALLOC 0) state no airframe.
-    """
-    file_values = parameters.by_origin("file")
-    if parameters["CA_AIRFRAME"] != _FIXED_WING:
-        if "CA_AIRFRAME" in file_values and parameters["SYS_CTRL_ALLOC"] != 0.0:
-            yield f"CA_AIRFRAME {parameters['CA_AIRFRAME']:g} is not a fixed wing, which is not simulated"
-        return
-    if file_values.get("CA_ROTOR_COUNT", 1.0) == 0.0:
-        yield "CA_ROTOR_COUNT 0 leaves no motor, which is not simulated"
-    names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(file_values.get("CA_SV_CS_COUNT", 0.0)))]
-    if "CA_SV_CS_COUNT" in file_values and file_values.keys() >= set(names):
-        for part, types in _SURFACES_BY_PART.items():
-            torque = _TORQUE_BY_PART[part]
-            moved_types = {
-                file_values[name] for name in names if file_values.get(name.replace("TYPE", torque), 1.0) != 0.0
-            }
-            if moved_types.isdisjoint(types):
-                yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:

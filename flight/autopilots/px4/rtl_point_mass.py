@@ -106,54 +106,25 @@ def fly_returns(
 
     def fly(k: int, positions: Floats, result: Record) -> None:
         """Simulate the RTL from start k, and fill its positions and its result."""
-        limits = timeouts[k], float(min_clearances[k]), float(min_distances[k])
-        transit_altitude = targets[k].transit_altitude
-        _fly_one(starts[k], routes[k], transit_altitude, record, aircraft, environment, limits, positions, result)
+        fly_rtl(
+            starts[k],
+            routes[k],
+            targets[k].transit_altitude,
+            record,
+            *aircraft.tables,
+            environment.heights,
+            environment.to_pixel,
+            environment.spheres,
+            environment.radii,
+            environment.known,
+            timeouts[k],
+            float(min_clearances[k]),
+            float(min_distances[k]),
+            positions,
+            result,
+        )
 
     return simulate_each(timeouts, fly, store_positions=store_positions)
-
-
-def _fly_one(
-    start: Record,
-    route: Records,
-    transit_altitude: float,
-    parameters: Record,
-    aircraft: PointMass,
-    environment: ReturnEnvironment,
-    limits: tuple[float, float, float],
-    positions: Floats,
-    result: Record,
-) -> None:
-    """Simulate one RTL by the compiled `fly_rtl`, to which the arrays of point mass and terrain are passed.
-
-    start: position, velocity, bank and time of the start, a `RETURN_START` record.
-    route: the start, then the loiter at the RTL's end, or the stops of a landing sequence and the landing.
-    transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    aircraft: point mass of the aircraft in the wind.
-    environment: terrain and kill spheres from which the clearances are measured.
-    limits: timeout, s, and height above ground and distance outside spheres, m, below which the RTL is aborted.
-    positions: array (t, 3), m, to fill with one position per second until it is full.
-    result: `RETURN_RESULT` record to fill.
-    """
-    timeout, min_clearance, min_distance = limits
-    fly_rtl(
-        start,
-        route,
-        transit_altitude,
-        parameters,
-        *aircraft.tables,
-        environment.heights,
-        environment.to_pixel,
-        environment.spheres,
-        environment.radii,
-        environment.known,
-        timeout,
-        min_clearance,
-        min_distance,
-        positions,
-        result,
-    )
 
 
 def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) -> Records:
@@ -255,7 +226,14 @@ def fly_rtl(
         if tick % _STORED_EVERY_TICKS == 0:
             store_position(estimated, positions, result)
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas_to_tas_ratio(estimated.up) ** 2
-        has_arrived = _update_arrival(estimated, waypoints, memory, radius, lands, has_begun, time, result)
+        # An RTL to a loiter arrives over its destination; an RTL to a landing when it begins the leg to the landing.
+        if lands:
+            has_arrived = has_begun and memory.leg + 2 >= waypoints.shape[0]
+        else:
+            distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
+            has_arrived = memory.rtl_climb_complete and distance < max(LOITER_CAPTURE_RADIUS_M, radius)
+        if has_arrived and math.isnan(result.arrival_time):
+            result.arrival_time, result.arrival_altitude = time, estimated.up
         update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
         if result.outcome == RETURN_TIMEOUT:
             if result.clearance < min_clearance or result.sphere_distance < min_distance:
@@ -274,41 +252,6 @@ def fly_rtl(
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     are_arrays_alive = motions.size + states.size + memories.size + progress_records.size == 4
     result.energy = energy / 3600.0 if aircraft.has_power and are_arrays_alive else math.nan
-
-
-@inner
-def _update_arrival(
-    estimated: Record,
-    waypoints: Records,
-    memory: Record,
-    radius: float,
-    lands: bool,
-    has_begun_sequence: bool,
-    time: float,
-    result: Record,
-) -> bool:
-    """Return True once the RTL has arrived, and record the time of the arrival.
-
-    An RTL to a loiter arrives over its destination; an RTL to a landing arrives when it begins the leg to the landing.
-
-    radius: distance from the loiter's center within which the aircraft has arrived, m.
-    lands: True for an RTL to a landing sequence.
-    has_begun_sequence: True once the aircraft flies this sequence.
-    time: time since the start, s.
-    estimated: position and velocity over the ground, a `MOTION` record.
-    waypoints: `WAYPOINT` records, (w,).
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
-    result: `RETURN_RESULT` record, which is updated.
-    """
-    if lands:
-        has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
-    else:
-        target = waypoints[waypoints.shape[0] - 1]
-        distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
-        has_arrived = memory.rtl_climb_complete and distance < max(LOITER_CAPTURE_RADIUS_M, radius)
-    if has_arrived and math.isnan(result.arrival_time):
-        result.arrival_time, result.arrival_altitude = time, estimated.up
-    return has_arrived
 
 
 @inner

@@ -91,7 +91,13 @@ def update_tecs(
     update_altitude_reference(parameters, memory, dt)
     update_airspeed_filter(state.airspeed, parameters, memory, dt)
     tas = memory.tas
-    _adapt_airspeed_setpoint(airspeed_setpoint, parameters, memory, eas_to_tas, dt)
+    # `adapt_airspeed_setpoint`: a setpoint outside the airspeed limits moves to the limit at once, and otherwise at a
+    # limited rate. In a bank the minimum airspeed grows as the square root of the load factor.
+    min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
+    tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
+    step = _AIRSPEED_SLEW_MPS2 * eas_to_tas * dt
+    tas_setpoint = min(memory.tas_setpoint + step, max(memory.tas_setpoint - step, airspeed_setpoint * eas_to_tas))
+    memory.tas_setpoint = min(tas_max, max(tas_min, tas_setpoint))
     # In thin air the aircraft sinks faster at idle (`PerformanceModel::getMinimumSinkRate`).
     min_sink_rate = parameters.min_sink_rate * eas_to_tas
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
@@ -118,28 +124,6 @@ def update_tecs(
         eas_to_tas,
         dt,
     )
-
-
-@inner
-def _adapt_airspeed_setpoint(
-    airspeed_setpoint: float, parameters: Record, memory: Record, eas_to_tas: float, dt: float
-) -> None:
-    """Move the true airspeed setpoint towards an equivalent airspeed (m/s) at a limited rate.
-
-    Follows `adapt_airspeed_setpoint`. A setpoint outside the airspeed limits moves to the limit at once. In a bank the
-    minimum airspeed grows as the square root of the load factor.
-
-    airspeed_setpoint: equivalent airspeed, m/s.
-    parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: `PX4_MEMORY` record; its true airspeed setpoint (m/s) is updated.
-    eas_to_tas: ratio of true to equivalent airspeed.
-    dt: duration of a tick, s.
-    """
-    min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
-    tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
-    step = _AIRSPEED_SLEW_MPS2 * eas_to_tas * dt
-    tas_setpoint = min(memory.tas_setpoint + step, max(memory.tas_setpoint - step, airspeed_setpoint * eas_to_tas))
-    memory.tas_setpoint = min(tas_max, max(tas_min, tas_setpoint))
 
 
 @inner

@@ -233,8 +233,23 @@ class SitlFlight(ProgramFlight):
             gear = default_gear(self._ground_phases)
             self._law = ground_law(self._ground_phases, aircraft, find_contacts(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
+        # Trim the aircraft before the first waypoint, at the end of whose rail it is released straight and level, or on
+        # the rail of the launch for a take-off.
         self._release: Release | None = None
-        self._rail = self._trim_on_rail(setup)
+        start, points, take_off = self._find_start(setup), setup.route.positions, self._ground_phases.take_off
+        if take_off is not None:
+            self._start_trimmed(setup.mission.source, start)
+            self._release = find_release(setup, self.map, self._ground, self.fdm.aircraft, take_off)
+            self._rail = launch_rail(self._release, take_off)
+        else:
+            first_leg = points[1, :2] - points[0, :2]
+            release_position = points[0, :2] - first_leg / np.hypot(*first_leg) * max(
+                MIN_RUN_IN_DISTANCE_M, MIN_RUN_IN_TIME_S * start.airspeed
+            )
+            lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *release_position))
+            release_start = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
+            self._start_trimmed(setup.mission.source, release_start)
+            self._rail = rail_end(self.fdm.read(), start.wind)
         self._start_disturbances(setup)
         self._mission = make_uploaded_mission(setup)
         if self._law is not None:
@@ -334,26 +349,6 @@ class SitlFlight(ProgramFlight):
         except FlightError as error:
             is_named = str(error).startswith(str(self._binary))
             raise error_class.from_error(error, "" if is_named else self._binary) from error
-
-    def _trim_on_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft before the first waypoint, and return the rail that ends there.
-
-        The aircraft is released straight and level. For a take-off, return the rail of the launch.
-        """
-        start, points = self._find_start(setup), setup.route.positions
-        if self._ground_phases.take_off is not None:
-            self._start_trimmed(setup.mission.source, start)
-            aircraft = self.fdm.aircraft
-            self._release = find_release(setup, self.map, self._ground, aircraft, self._ground_phases.take_off)
-            return launch_rail(self._release, self._ground_phases.take_off)
-        first_leg = points[1, :2] - points[0, :2]
-        release_position = points[0, :2] - first_leg / np.hypot(*first_leg) * max(
-            MIN_RUN_IN_DISTANCE_M, MIN_RUN_IN_TIME_S * start.airspeed
-        )
-        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *release_position))
-        release_start = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
-        self._start_trimmed(setup.mission.source, release_start)
-        return rail_end(self.fdm.read(), start.wind)
 
     def _hold_during(self, step: ConversationStep) -> None:
         """Hold the aircraft at rest on the rail during a step of the conversation with the program."""

@@ -144,14 +144,13 @@ def _parse_output(name: str, entry: Any) -> ServoOutput:
     if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_OUTPUT:
         raise ValueError(f"{name}.output = {number!r}: allowed 1..{_MAX_OUTPUT}")
     for label, numbers in (("pulse_us", pulses), (key, values)):
-        if not (isinstance(numbers, list) and len(numbers) >= 2 and all(map(_is_number, numbers))):
+        are_finite = isinstance(numbers, list) and all(
+            isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number)
+            for number in numbers
+        )
+        if not are_finite or len(numbers) < 2:
             raise ValueError(f"{name}.{label} = {numbers!r}: expected two finite numbers or more")
     if len(pulses) != len(values) or any(later <= earlier for earlier, later in pairwise(pulses)):
         raise ValueError(f"{name}.pulse_us = {pulses!r}: expected increasing numbers, as many as in {key}")
     factor = math.radians(1.0) if unit else 1.0
     return ServoOutput(number, tuple(map(float, pulses)), tuple(factor * value for value in values))
-
-
-def _is_number(value: object) -> bool:
-    """Return True for a finite number that is not a bool."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

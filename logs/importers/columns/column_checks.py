@@ -123,8 +123,18 @@ def check_signs_and_units(log: ColumnLog) -> None:
             raise LogError.at(
                 log.table_path, "columns.acceleration_down", f"{entry.column} is {force:.3g} m/s2 in flight", allowed
             )
-    if log.has("yaw"):
-        _check_heading(log, grid)
+    if log.has("yaw") and (velocity := _find_ground_velocity(log, grid)) is not None:
+        # The heading is far from the ground course, or turns in the opposite direction.
+        course, yaw = np.angle(velocity), _average_on_grid(log.series("yaw"), grid, wraps=True)
+        same, reversed_yaw = (complex(np.mean(np.exp(1j * (course - sign * yaw)))) for sign in (1.0, -1.0))
+        difference = math.degrees(math.atan2(same.imag, same.real))
+        message = ""
+        if abs(same) > _CLEAR_ALIGNMENT and abs(math.radians(difference)) > _MAX_HEADING_DIFFERENCE_RAD:
+            message = f"differs by {difference:.0f} deg from the ground course on average"
+        elif abs(reversed_yaw) > _CLEAR_ALIGNMENT > abs(same):
+            message = "turns opposite to the ground course"
+        if message:
+            raise _make_contradiction_error(log, "yaw", message, "check sign, frame and offset")
     if log.has("throttle", "current"):
         throttle, current = (_average_on_grid(log.series(name), grid) for name in ("throttle", "current"))
         low, high = np.percentile(current, [5.0, 95.0]).tolist()
@@ -204,7 +214,21 @@ def _list_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         east = east * np.cos(_average_on_grid(latitude, grid))
         yield _Pair("velocity_east", "the change of longitude", log.series("velocity_east"), east)
     if log.has("roll", "pitch", "yaw"):
-        yield from _list_attitude_pairs(log, grid)
+        # Each body rate follows from the change of the angles, and the turn rate from roll.
+        angles = {name: log.series(name) for name in ("roll", "pitch", "yaw")}
+        roll, pitch, yaw = (_average_on_grid(series, grid, wraps=True) for series in angles.values())
+        roll_change, pitch_change, yaw_change = (
+            _differentiate_on_grid(series, grid, wraps=True) for series in angles.values()
+        )
+        rates = {
+            "roll_rate": roll_change - yaw_change * np.sin(pitch),
+            "pitch_rate": pitch_change * np.cos(roll) + yaw_change * np.cos(pitch) * np.sin(roll),
+            "yaw_rate": yaw_change * np.cos(pitch) * np.cos(roll) - pitch_change * np.sin(roll),
+        }
+        for name, values in rates.items():
+            if log.has(name):
+                yield _Pair(name, "the change of roll, pitch and yaw", log.series(name), values)
+        yield _Pair("roll", "the turn rate from yaw", angles["roll"], yaw_change, exact=False, simultaneous=False)
     if log.has("throttle", "current"):
         current = _average_on_grid(log.series("current"), grid)
         yield _Pair("throttle", "the current", log.series("throttle"), current, exact=False)
@@ -215,54 +239,23 @@ def _list_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         air = np.abs(triangle.velocity - triangle.wind)
         yield _Pair("airspeed", "ground velocity and heading", log.series("airspeed"), air, exact=False)
     # The accelerations come last, because a wrong velocity or attitude contradicts all of them.
-    yield from _list_acceleration_pairs(log, grid)
-
-
-def _list_attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
-    """Yield pairs to cross-check the logged angular rates and the roll angle.
-
-    Each logged body rate is paired with the rate that follows from roll, pitch and yaw, and roll with the turn rate
-    that follows from yaw.
-    """
-    angles = {name: log.series(name) for name in ("roll", "pitch", "yaw")}
-    roll, pitch = (_average_on_grid(angles[name], grid, wraps=True) for name in ("roll", "pitch"))
-    roll_change, pitch_change, yaw_change = (
-        _differentiate_on_grid(series, grid, wraps=True) for series in angles.values()
-    )
-    expected = {
-        "roll_rate": roll_change - yaw_change * np.sin(pitch),
-        "pitch_rate": pitch_change * np.cos(roll) + yaw_change * np.cos(pitch) * np.sin(roll),
-        "yaw_rate": yaw_change * np.cos(pitch) * np.cos(roll) - pitch_change * np.sin(roll),
-    }
-    for name, values in expected.items():
-        if log.has(name):
-            yield _Pair(name, "the change of roll, pitch and yaw", log.series(name), values)
-    yield _Pair("roll", "the turn rate from yaw", angles["roll"], yaw_change, exact=False, simultaneous=False)
-
-
-def _list_acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
-    """Yield pairs to cross-check the logged accelerations.
-
-    Each acceleration is paired with the rate of change of the velocity minus gravity, in body axes.
-    """
-    if not log.has("roll", "pitch", "yaw", "velocity_north", "velocity_east", "velocity_down"):
-        return
-    roll, pitch, yaw = (_average_on_grid(log.series(name), grid, wraps=True) for name in ("roll", "pitch", "yaw"))
-    north, east, down = (
-        _differentiate_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east", "down")
-    )
-    forward = north * np.cos(yaw) + east * np.sin(yaw)
-    right = east * np.cos(yaw) - north * np.sin(yaw)
-    down = down - _GRAVITY_MPS2
-    pitched_down = forward * np.sin(pitch) + down * np.cos(pitch)
-    forces = {
-        "acceleration_forward": forward * np.cos(pitch) - down * np.sin(pitch),
-        "acceleration_right": right * np.cos(roll) + pitched_down * np.sin(roll),
-        "acceleration_down": pitched_down * np.cos(roll) - right * np.sin(roll),
-    }
-    for name, values in forces.items():
-        if log.has(name):
-            yield _Pair(name, "the change of velocity, and the attitude", log.series(name), values)
+    if log.has("roll", "pitch", "yaw", "velocity_north", "velocity_east", "velocity_down"):
+        # Specific force in body axes: the rate of change of the velocity minus gravity.
+        north, east, down = (
+            _differentiate_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east", "down")
+        )
+        forward = north * np.cos(yaw) + east * np.sin(yaw)
+        right = east * np.cos(yaw) - north * np.sin(yaw)
+        down = down - _GRAVITY_MPS2
+        pitched_down = forward * np.sin(pitch) + down * np.cos(pitch)
+        forces = {
+            "acceleration_forward": forward * np.cos(pitch) - down * np.sin(pitch),
+            "acceleration_right": right * np.cos(roll) + pitched_down * np.sin(roll),
+            "acceleration_down": pitched_down * np.cos(roll) - right * np.sin(roll),
+        }
+        for name, values in forces.items():
+            if log.has(name):
+                yield _Pair(name, "the change of velocity, and the attitude", log.series(name), values)
 
 
 def _find_ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
@@ -420,43 +413,18 @@ def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
         message = f"is {1.0 / triangle.factor:.3g} times the airspeed that follows from ground velocity and heading"
         raise _make_contradiction_error(log, "airspeed", message, f"check unit ({log.unit('airspeed')}) and scale")
     if abs(triangle.wind) > _CLEAR_WIND_MPS:
-        for quantity, wind in _read_mean_winds(log, grid):
+        # A log may state the wind by components, by speed and direction, or twice by both.
+        winds: list[tuple[str, complex]] = []
+        if log.has("wind_north", "wind_east"):
+            north, east = (_average_on_grid(log.series(f"wind_{axis}"), grid) for axis in ("north", "east"))
+            winds.append(("wind_north", complex(float(np.mean(north)), float(np.mean(east)))))
+        if log.has("wind_speed", "wind_direction"):
+            speed = _average_on_grid(log.series("wind_speed"), grid)
+            direction = _average_on_grid(log.series("wind_direction"), grid, wraps=True)
+            winds.append(("wind_direction", complex(-np.mean(speed * np.exp(1j * direction)))))
+        for quantity, wind in winds:
             wind_ratio = (wind / triangle.wind).real
             low, high = _WIND_RATIO_RANGE
             if not low <= wind_ratio <= high:
                 message = f"states {wind_ratio:.2g} times the wind that follows from airspeed, heading and velocity"
                 raise _make_contradiction_error(log, quantity, message, "check unit and frame (from, to)")
-
-
-def _read_mean_winds(log: ColumnLog, grid: Floats) -> Iterator[tuple[str, complex]]:
-    """Yield the mean of each logged wind, with the name of a quantity that states it.
-
-    A log may state the wind by components, by speed and direction, or twice by both.  The wind is a complex number,
-    north + i east, m/s.
-    """
-    if log.has("wind_north", "wind_east"):
-        north, east = (float(np.mean(_average_on_grid(log.series(f"wind_{axis}"), grid))) for axis in ("north", "east"))
-        yield "wind_north", complex(north, east)
-    if log.has("wind_speed", "wind_direction"):
-        origin = _average_on_grid(log.series("wind_direction"), grid, wraps=True)
-        yield (
-            "wind_direction",
-            complex(-np.mean(_average_on_grid(log.series("wind_speed"), grid) * np.exp(1j * origin))),
-        )
-
-
-def _check_heading(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError if the heading is far from the ground course, or turns in the opposite direction."""
-    velocity = _find_ground_velocity(log, grid)
-    if velocity is None:
-        return
-    course, yaw = np.angle(velocity), _average_on_grid(log.series("yaw"), grid, wraps=True)
-    same, reversed_yaw = (complex(np.mean(np.exp(1j * (course - sign * yaw)))) for sign in (1.0, -1.0))
-    difference = math.degrees(math.atan2(same.imag, same.real))
-    message = ""
-    if abs(same) > _CLEAR_ALIGNMENT and abs(math.radians(difference)) > _MAX_HEADING_DIFFERENCE_RAD:
-        message = f"differs by {difference:.0f} deg from the ground course on average"
-    elif abs(reversed_yaw) > _CLEAR_ALIGNMENT > abs(same):
-        message = "turns opposite to the ground course"
-    if message:
-        raise _make_contradiction_error(log, "yaw", message, "check sign, frame and offset")

@@ -336,10 +336,18 @@ class ColumnLog:
                 self._find_column_on_clock(clock, align.column, f"{field}.column", name),
                 self._locate_column(clock.data, align.column),
             )
-            partner = self._read_alignment_partner(align.partner, field)
-            is_known = np.isfinite(values)
+            # The signal to align with is a quantity, or a column with the main clock.
+            if align.partner in self.table.columns:
+                partner = self.series(align.partner)
+            else:
+                main = self._get_clock(self._main_clock)
+                column = self._find_column_on_clock(main, align.partner, f"{field}.with", self._main_clock)
+                place = self._locate_column(main.data, align.partner)
+                partner = Series(self._align_times(self._main_clock), _parse_numbers(column, place))
+            is_known, is_partner_known = np.isfinite(values), np.isfinite(partner.values)
             time = self._get_unaligned_times(name)[is_known]
-            best = find_clock_shift(time, values[is_known], *partner, align.within_s)
+            partner_time, partner_values = partner.time[is_partner_known], partner.values[is_partner_known]
+            best = find_clock_shift(time, values[is_known], partner_time, partner_values, align.within_s)
             if best.correlation < _MIN_CORRELATION:
                 message = f"{align.column} and {align.partner} have a correlation of at most {best.correlation:.2f}"
                 requirement = f"expected at least {_MIN_CORRELATION:g} at a shift of at most {align.within_s:g} s"
@@ -348,22 +356,6 @@ class ColumnLog:
                 )
             self._shifts[name] = best.shift
         return self._shifts[name]
-
-    def _read_alignment_partner(self, name: str, field: str) -> tuple[Floats, Floats]:
-        """Return times and finite values of the signal to which a clock is aligned.
-
-        name: a quantity, or a column with the main clock.
-        """
-        if name in self.table.columns:
-            series = self.series(name)
-        else:
-            clock = self._get_clock(self._main_clock)
-            column = self._find_column_on_clock(clock, name, f"{field}.with", self._main_clock)
-            series = Series(
-                self._align_times(self._main_clock), _parse_numbers(column, self._locate_column(clock.data, name))
-            )
-        known = np.isfinite(series.values)
-        return series.time[known], series.values[known]
 
     # ------------------------------------------------------------------
     # Columns.

@@ -171,7 +171,14 @@ def read_air(log: ColumnLog) -> AirData:
         ratio = Samples(pressure.time, np.sqrt(_SEA_LEVEL_DENSITY / density)[:, np.newaxis])
     airspeed = true_airspeed = _read_joined_series(log, "airspeed")
     if len(airspeed.time):
-        factor = _find_airspeed_ratio(ratio, _read_joined_series(log, "altitude"), airspeed.time)[:, np.newaxis]
+        time, height = airspeed.time, _read_joined_series(log, "altitude")
+        if len(ratio.time):
+            factor = np.interp(time, ratio.time, ratio.values[:, 0])[:, np.newaxis]
+        else:
+            altitude = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
+            # The air density of the standard atmosphere decreases with (1 - 2.25577e-5 h)^4.25588, and the ratio is the
+            # inverse square root of the density relative to sea level.
+            factor = (1.0 - 2.25577e-5 * np.clip(altitude, -500.0, 9000.0))[:, np.newaxis] ** -2.12794
         if log.frame("airspeed") == "true":
             airspeed = Samples(airspeed.time, airspeed.values / factor)
         else:
@@ -193,20 +200,6 @@ def read_air(log: ColumnLog) -> AirData:
             "the triangle of velocities",
         )
     return AirData(airspeed, true_airspeed, ratio, wind, source)
-
-
-def _find_airspeed_ratio(ratio: Samples, height: Samples, time: Floats) -> Floats:
-    """Return the ratio of true to indicated airspeed at each time, (n,).
-
-    ratio: logged ratio, (k, 1); if it has no rows, the ratio of the standard atmosphere at the altitude is returned.
-    height: altitude, m AMSL, (m, 1); 0 if it has no rows.
-    """
-    if len(ratio.time):
-        return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
-    altitude = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
-    # The air density of the standard atmosphere decreases with (1 - 2.25577e-5 h)^4.25588, and the ratio is the inverse
-    # square root of the density relative to sea level.
-    return np.asarray((1.0 - 2.25577e-5 * np.clip(altitude, -500.0, 9000.0)) ** -2.12794)
 
 
 def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:

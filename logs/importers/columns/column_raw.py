@@ -41,6 +41,21 @@ def read_columns(path: Path) -> RawLog:
         up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
     values = np.column_stack([np.degrees(parts.values), up])
     position = LogSeries(log.column("altitude" if log.has("altitude") else "latitude"), parts.time, values)
+    missions = []
+    if log.table.mission is not None:
+        mission_path = log.table_path.parent / log.table.mission
+        missions.append(LoggedMission(0.0, read_mission(mission_path), mission_path.name))
+    # Each change of the quantity `mode`, with the mode's name from the table's [modes].
+    modes = []
+    if log.has("mode"):
+        time, mode_values = log.raw_values("mode")
+        names, automatic = log.table.modes.names, log.table.modes.automatic
+        previous = None
+        for start, value in zip(time.tolist(), mode_values.tolist(), strict=True):
+            if value != previous:
+                key = f"{value:g}" if isinstance(value, float) else decode_cell(value)
+                modes.append(ModeChange(start, names.get(key, key), value in automatic or key in automatic))
+                previous = value
     return RawLog(
         source=str(path),
         format=FORMAT,
@@ -49,8 +64,8 @@ def read_columns(path: Path) -> RawLog:
         series={"position": position} | dict(_read_series(log)),
         heights=(),
         datum=_DATUMS[log.frame("altitude")] if log.has("altitude") else "unstated",
-        modes=tuple(_read_modes(log)),
-        missions=tuple(_read_missions(log)),
+        modes=tuple(modes),
+        missions=tuple(missions),
         parameters=log.parameters(),
         clock="start",
         utc_start=log.utc_start,
@@ -88,24 +103,3 @@ def _read_series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
     if log.has("throttle"):
         throttle = join_series([log.series("throttle")])
         yield "throttle", LogSeries(log.column("throttle"), throttle.time, throttle.values)
-
-
-def _read_missions(log: ColumnLog) -> Iterator[LoggedMission]:
-    """Yield the mission file that the table names, if any."""
-    if log.table.mission is not None:
-        path = log.table_path.parent / log.table.mission
-        yield LoggedMission(0.0, read_mission(path), path.name)
-
-
-def _read_modes(log: ColumnLog) -> Iterator[ModeChange]:
-    """Yield each change of the quantity `mode`, with the mode's name from the table's [modes]."""
-    if not log.has("mode"):
-        return
-    time, values = log.raw_values("mode")
-    names, automatic = log.table.modes.names, log.table.modes.automatic
-    previous = None
-    for start, value in zip(time.tolist(), values.tolist(), strict=True):
-        if value != previous:
-            key = f"{value:g}" if isinstance(value, float) else decode_cell(value)
-            yield ModeChange(start, names.get(key, key), value in automatic or key in automatic)
-            previous = value

@@ -12,7 +12,6 @@ import numpy as np
 from logs.importers.columns.column_table import MAIN_CLOCK
 from logs.importers.columns.data_files import Column, DataFile, read_data_file
 from logs.importers.columns.quantities import ANGLES, QUANTITIES, QUATERNION, UNIT_ZEROS, UNITS
-from world.arrays import Floats
 from world.errors import LogError
 from world.wording import count_text
 
@@ -212,7 +211,17 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     """
     file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
     files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
-    all_clocks = [clock for file, data in files.items() for clock in _find_clocks(data, file)]
+    # A clock is a column with increasing values and a name that means time.
+    all_clocks = []
+    for file, data in files.items():
+        for column, values in data.columns.items():
+            prefix, name, stated_unit = _split_column_name(data, column)
+            is_time = not {_normalize_name(name), _normalize_name(column.rpartition(".")[2])}.isdisjoint(_TIMES)
+            unit = _find_time_unit(values, stated_unit) if is_time else ""
+            if unit:
+                factor = UNITS["time"][unit]
+                span = (0.0, 0.0) if unit == "iso" else (float(values[0]) * factor, float(values[-1]) * factor)
+                all_clocks.append(_Clock(file, prefix, column, unit, len(values), span))
     clocks: list[_Clock] = []
     for clock in sorted(all_clocks, key=lambda clock: -clock.length):
         # Of several columns of times in a group, use the one with the most time in common with the longest group.
@@ -255,21 +264,6 @@ def _split_column_name(data: DataFile, column: str) -> tuple[str, str, str]:
     if match and spelling in _SPELLINGS and match.start() > 0:
         return prefix, name[: match.start()], unit or _SPELLINGS[spelling]
     return prefix, name, unit
-
-
-def _find_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
-    """Yield a clock for each column of a file with increasing values and a name that means time.
-
-    file: name of the file in the table.
-    """
-    for column, values in data.columns.items():
-        prefix, name, unit = _split_column_name(data, column)
-        if {_normalize_name(name), _normalize_name(column.rpartition(".")[2])} & set(_TIMES) and (
-            unit := _find_time_unit(values, unit)
-        ):
-            factor = UNITS["time"][unit]
-            span = (0.0, 0.0) if unit == "iso" else (float(values[0]) * factor, float(values[-1]) * factor)
-            yield _Clock(file, prefix, column, unit, len(values), span)
 
 
 def _find_time_unit(values: Column, stated_unit: str) -> str:
@@ -332,8 +326,17 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
     known = numbers[np.isfinite(numbers)]
     if not known.size or not np.ptp(known):
         return None
-    unit = stated_unit if stated_unit in UNITS[entry.dimension] else _find_plausible_unit(quantity, known)
-    if unit is None:
+    units = (stated_unit,) if stated_unit in UNITS[entry.dimension] else _TRIED[entry.dimension]
+    for unit in units:
+        # At least 98 % of the values must lie in the range of the quantity, and their median must be usual for it.
+        scaled = known * UNITS[entry.dimension][unit] + UNIT_ZEROS.get(unit, 0.0)
+        plausible_fraction = float(((scaled >= entry.low) & (scaled <= entry.high)).mean())
+        median = float(np.median(np.abs(scaled)))
+        is_usual = median >= _LEAST_MEDIANS.get(quantity, 0.0)
+        is_usual &= quantity != "voltage" or median <= _HIGHEST_VOLTAGE_V
+        if unit == stated_unit or (plausible_fraction >= 0.98 and is_usual):
+            break
+    else:
         return None
     reason = f": largest value {np.abs(known).max():.4g}" + (
         f", named {stated_unit}" if stated_unit and unit == stated_unit else ""
@@ -346,25 +349,6 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
         frames = QUANTITIES[quantity].frames
         frame = frames[0] if frames else ""
     return _Guess(quantity, column, clock, unit, frame, reason)
-
-
-def _find_plausible_unit(quantity: str, known: Floats) -> str | None:
-    """Return the first unit in which the values of a quantity are plausible, or None.
-
-    They are plausible if at least 98 % of them lie in the range of the quantity, and their median is usual for it.
-
-    known: finite values of the column.
-    """
-    entry = QUANTITIES[quantity]
-    for unit in _TRIED[entry.dimension]:
-        values = known * UNITS[entry.dimension][unit] + UNIT_ZEROS.get(unit, 0.0)
-        plausible_fraction = float(((values >= entry.low) & (values <= entry.high)).mean())
-        median = float(np.median(np.abs(values)))
-        is_usual = median >= _LEAST_MEDIANS.get(quantity, 0.0)
-        is_usual &= quantity != "voltage" or median <= _HIGHEST_VOLTAGE_V
-        if plausible_fraction >= 0.98 and is_usual:
-            return unit
-    return None
 
 
 def _format_table(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files: dict[str, DataFile]) -> str:
@@ -400,42 +384,30 @@ def _format_table(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], fil
         parts += [f'frame = "{guess.frame}"'] if guess.frame else []
         parts += [f'clock = "{names[guess.clock]}"'] if guess.clock != main_clock else []
         lines.append(f"{guess.quantity} = {{ {', '.join(parts)} }}  # guess{guess.reason}")
-    return "\n".join([*lines, *_format_missing_lines(guesses), *_format_unused_lines(guesses, files)]) + "\n"
-
-
-def _format_missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
-    """Yield comment lines for the table: the needed and the optional quantities that were not found."""
+    # The needed and the optional quantities that were not found.
     found_quantities = {guess.quantity for guess in guesses}
     substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
         "elevator": "elevon_left",
         "aileron": "aileron_left" if "aileron_left" in found_quantities else "elevon_left",
     }
-    yield ""
+    lines.append("")
     for purpose, quantities in _NEEDED.items():
-        missing = [
-            name
-            for name in quantities
-            if name not in found_quantities and substitutes.get(name) not in found_quantities
-        ]
+        missing = [name for name in quantities if found_quantities.isdisjoint({name, substitutes.get(name)})]
         if missing:
-            yield f"# Not found, and needed by planfly {purpose}: {', '.join(missing)}"
+            lines.append(f"# Not found, and needed by planfly {purpose}: {', '.join(missing)}")
     settled = found_quantities.union(*_NEEDED.values(), QUATERNION if found_quantities.issuperset(ANGLES) else ())
     remaining_quantities = [name for name in QUANTITIES if name not in settled]
     if remaining_quantities:
-        yield f"# Not found, and optional: {', '.join(remaining_quantities)}"
-
-
-def _format_unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
-    """Yield a comment line for each file that has unused columns next to columns that a guess uses."""
-    used = {(guess.clock.file, guess.column) for guess in guesses} | {
-        (guess.clock.file, guess.clock.column) for guess in guesses
-    }
-    for file, data in files.items():
-        kinds = {(guess.clock.prefix, guess.clock.length) for guess in guesses if guess.clock.file == file}
-        names = [
-            name
-            for name, values in data.columns.items()
-            if (file, name) not in used and (name.rpartition(".")[0], len(values)) in kinds
+        lines.append(f"# Not found, and optional: {', '.join(remaining_quantities)}")
+    # The unused columns next to columns that a guess uses.
+    used = {(guess.clock.file, column) for guess in guesses for column in (guess.column, guess.clock.column)}
+    for data_file, data in files.items():
+        kinds = {(guess.clock.prefix, guess.clock.length) for guess in guesses if guess.clock.file == data_file}
+        unused = [
+            column
+            for column, values in data.columns.items()
+            if (data_file, column) not in used and (column.rpartition(".")[0], len(values)) in kinds
         ]
-        if names:
-            yield f"# Columns of {file} that are not used: {', '.join(names)}"
+        if unused:
+            lines.append(f"# Columns of {data_file} that are not used: {', '.join(unused)}")
+    return "\n".join(lines) + "\n"

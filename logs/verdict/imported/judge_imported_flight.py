@@ -81,10 +81,25 @@ def imported_lines(
             continue
         count_text = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
         unjudged_lines.append(f"Not judged: {rule.title}{count_text} ({unjudged[0].brief})")
-    lines += [
-        *_judged_lines(imported_log, flown_stretches, setup.route.leg_numbers.tolist()),
-        *unjudged_lines,
-    ]
+    # One line for each stretch, with its time and the numbers of its judged legs.
+    if not imported_log.stretches:
+        lines.append("Judged: nothing, because no part of the flight followed the mission")
+    legs_by_start = {legs.stretch.start: legs for legs in flown_stretches}
+    for stretch in imported_log.stretches:
+        name = f"the flight in {stretch.mode}" if stretch.mode else "the flight"
+        time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+        time_text += "" if stretch.mode else " (the log contains no modes)"
+        legs = legs_by_start.get(stretch.start)
+        if legs is None:
+            lines.append(f"Not judged: {time_text}, because this part did not pass two waypoints in order")
+            continue
+        first, last = setup.route.leg_numbers[[legs.first, legs.last - 1]].tolist()
+        partial_text = f", leg {last} in part" if legs.partial else ""
+        start_time = float(legs.aligned.track.time[0])
+        lines.append(
+            f"Judged: {time_text}, on legs {first} to {last}{partial_text}; leg {first} begins at {start_time:.1f} s"
+        )
+    lines += unjudged_lines
     lines += [line] if (line := corridor_line(setup, findings)) else []
     if imported_log.mission:
         lines.append(f"Mission: {imported_log.mission}")
@@ -98,34 +113,6 @@ def imported_lines(
     lines += [f"Note: {note}" for note in imported_log.notes]
     lines += [f"Not flown as written: {note}" for note in setup.route.notes]
     return tuple(lines)
-
-
-def _judged_lines(
-    imported_log: ImportedLog, flown_stretches: Sequence[FlownLegs], leg_numbers: Sequence[int]
-) -> list[str]:
-    """Return a line for each stretch, with its time and the numbers of its judged legs.
-
-    leg_numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
-    """
-    if not imported_log.stretches:
-        return ["Judged: nothing, because no part of the flight followed the mission"]
-    by_start = {legs.stretch.start: legs for legs in flown_stretches}
-    lines = []
-    for stretch in imported_log.stretches:
-        name = f"the flight in {stretch.mode}" if stretch.mode else "the flight"
-        time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
-        time_text += "" if stretch.mode else " (the log contains no modes)"
-        legs = by_start.get(stretch.start)
-        if legs is None:
-            lines.append(f"Not judged: {time_text}, because this part did not pass two waypoints in order")
-            continue
-        first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
-        partial_text = f", leg {last} in part" if legs.partial else ""
-        start_time = float(legs.aligned.track.time[0])
-        lines.append(
-            f"Judged: {time_text}, on legs {first} to {last}{partial_text}; leg {first} begins at {start_time:.1f} s"
-        )
-    return lines
 
 
 def heights_text(imported_log: ImportedLog) -> str:
@@ -256,21 +243,38 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     flown_stretches = [
         legs for stretch in imported_log.stretches if (legs := flown_legs(setup, track, stretch)) is not None
     ]
-    findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown_stretches])
+    # Among the findings of all stretches for a rule, place and check, a failure replaces a pass, and a pass an unjudged
+    # finding.
+    merged: dict[tuple[str, Place, str], Finding] = {}
+    for finding in (finding for legs in flown_stretches for finding in _stretch_findings(setup, legs)):
+        key = (finding.rule, finding.place, finding.check)
+        if key not in merged or _merge_precedence(finding) > _merge_precedence(merged[key]):
+            merged[key] = finding
+    rules = dict.fromkeys(finding.rule for finding in merged.values())
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
-    findings = (*findings, *(judge(setup, flown_stretches, log_complete) for judge in end_judges))
-    has_failed = any(finding.ok is False for finding in findings)
-    undecided = undecided_text(findings)
-    unjudged_text = "; ".join(
-        filter(
-            None,
-            [
-                _missing_part_text(findings, imported_log.missing),
-                _pauses_text(flown_stretches),
-                f"not judged in full: {undecided}" if undecided else "",
-            ],
-        )
+    findings = (
+        *(finding for rule in rules for finding in merged.values() if finding.rule == rule),
+        *(judge(setup, flown_stretches, log_complete) for judge in end_judges),
     )
+    has_failed = any(finding.ok is False for finding in findings)
+    unjudged_texts = []
+    unended = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
+    if imported_log.missing is not None:
+        unjudged_texts.append(missing_text(imported_log.missing))
+    elif unended:
+        unjudged_texts.append(f"not judged from end to end: {unended[0]}")
+    pauses = []
+    for legs in flown_stretches:
+        time = legs.aligned.track.time
+        pauses += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > MAX_UNSEEN_TIME_S)]
+    if pauses:
+        start, end = max(pauses, key=lambda pause: pause[1] - pause[0])
+        others_text = f", and in {count_text(len(pauses) - 1, 'more pause')}" if len(pauses) > 1 else ""
+        pause_text = f"not judged from {start:.1f} s to {end:.1f} s{others_text}"
+        unjudged_texts.append(f"{pause_text}, because the log has no rows there")
+    if undecided := undecided_text(findings):
+        unjudged_texts.append(f"not judged in full: {undecided}")
+    unjudged_text = "; ".join(unjudged_texts)
     flyable = bool(flown_stretches) and not has_failed and not unjudged_text
     complete = not unjudged_text and all(finding.ok is True for finding in findings if finding.rule == "completion")
     answer_texts = (
@@ -300,40 +304,31 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     )
 
 
-def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Describe missing mission items or a missing part of the flight; return "" if the log is complete."""
-    if missing is not None:
-        return missing_text(missing)
-    parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
-    return f"not judged from end to end: {parts[0]}" if parts else ""
-
-
-def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
-    """Describe the pauses of the log that are too long to judge the flight; return "" if there are none."""
-    pauses = []
-    for legs in flown_stretches:
-        time = legs.aligned.track.time
-        pauses += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > MAX_UNSEEN_TIME_S)]
-    if not pauses:
-        return ""
-    start, end = max(pauses, key=lambda pause: pause[1] - pause[0])
-    others_text = f", and in {count_text(len(pauses) - 1, 'more pause')}" if len(pauses) > 1 else ""
-    return f"not judged from {start:.1f} s to {end:.1f} s{others_text}, because the log has no rows there"
-
-
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch; its findings number legs and waypoints as in the whole route."""
     findings = []
     for finding in run_rules(legs.requirements, legs.aligned):
-        checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
-        if legs.partial:
-            checked_finding = _unjudge_if_unreached(checked_finding, legs)
-        place = checked_finding.place
-        renumbered = checked_finding
-        if legs.first and place.index is not None and place.kind in ("leg", "waypoint"):
-            index = place.index + legs.first
-            renumbered = replace(checked_finding, place=replace(place, index=index))
-        findings.append(renumbered)
+        place, index, log_needs = finding.place, finding.place.index, RULES[finding.rule].log
+        checked = _unjudge_without_data(setup, legs, finding)
+        # Not judged, although passed: a leg with a gap in the log, and a waypoint, for rules that need its rows.
+        is_leg, is_waypoint = place.kind == "leg", place.kind == "waypoint"
+        if checked.ok is True and index is not None and (is_leg or (is_waypoint and log_needs.needs_no_gap)):
+            time, rows = legs.aligned.track.time, legs.aligned.rows
+            first, last = index if is_leg else max(0, index - 1), min(len(rows) - 1, index + 1)
+            gaps = gaps_between(legs, float(time[rows[first]]), float(time[rows[last]]))
+            if gaps:
+                reason = f"the log has no rows from {gaps[0].start:.1f} s to {gaps[0].end:.1f} s"
+                checked = _mark_unjudged(checked, reason, keep_measurements=True)
+        # Not judged: the last waypoint of a stretch that does not reach it, and the leg to this waypoint, for rules
+        # that need the whole leg, unless it failed.
+        is_last_leg = is_leg and index == legs.requirements.legs - 1
+        if legs.partial and is_waypoint and index == legs.requirements.legs:
+            checked = _mark_unjudged(checked, stretch_end_text(legs.stretch))
+        elif legs.partial and is_last_leg and log_needs.needs_full_leg and checked.ok is not False:
+            checked = _mark_unjudged(checked, f"flown in part: {stretch_end_text(legs.stretch)}")
+        if legs.first and index is not None and (is_leg or is_waypoint):
+            checked = replace(checked, place=replace(place, index=index + legs.first))
+        findings.append(checked)
     # An unjudged finding for each rule for which the log lacks the data, unless `LogNeeds.reports_missing` is False.
     judged_rules = {finding.rule for finding in findings}
     findings_without_data = []
@@ -368,7 +363,15 @@ def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding)
                 _DATUM_REASONS.get(imported_log.heights.datum, "") if has_plan_heights else "the plan states no heights"
             )
         else:
-            reason = _missing_values_text(legs, quantity)
+            track = legs.aligned.track
+            values = getattr(track, _TRACK_COLUMNS[quantity])
+            is_missing = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+            if is_missing.any():
+                time, rows_text = track.time[is_missing], count_text(int(is_missing.sum()), "row")
+                reason = (
+                    f"the log contains no {_QUANTITY_LABELS[quantity]} at {rows_text} from {time[0]:.1f} s to"
+                    f" {time[-1]:.1f} s"
+                )
         if reason:
             break
     if reason:
@@ -376,19 +379,6 @@ def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding)
     if not imported_log.aircraft_known and log_needs.needs_aircraft and finding.limit_source != "scenario":
         return _mark_unjudged(finding, _UNNAMED_TEXT, keep_measurements=bool(finding.ok))
     return finding
-
-
-def _missing_values_text(legs: FlownLegs, quantity: DataKind) -> str:
-    """Describe the rows of a stretch without a value of a quantity; return "" if every row has one."""
-    values = getattr(legs.aligned.track, _TRACK_COLUMNS[quantity])
-    is_missing = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
-    if not is_missing.any():
-        return ""
-    time = legs.aligned.track.time[is_missing]
-    return (
-        f"the log contains no {_QUANTITY_LABELS[quantity]} at {count_text(int(is_missing.sum()), 'row')} from "
-        f"{time[0]:.1f} s to {time[-1]:.1f} s"
-    )
 
 
 def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = False) -> Finding:
@@ -399,60 +389,6 @@ def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = Fa
     reason = f"{cause}; {finding.reason}" if keep_measurements else cause
     facts = finding.facts if keep_measurements else ()
     return replace(finding, ok=None, reason=reason, brief=cause, placed=False, margin=None, facts=facts, suggestions=())
-
-
-def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
-    """Return the finding; mark a passed one as not judged if the log has a gap on its leg or waypoint.
-
-    At a waypoint, only rules with `LogNeeds.needs_no_gap` are affected.
-    """
-    if finding.ok is not True or finding.place.index is None or finding.place.kind not in ("leg", "waypoint"):
-        return finding
-    track, rows = legs.aligned.track, legs.aligned.rows
-    first = finding.place.index if finding.place.kind == "leg" else max(0, finding.place.index - 1)
-    last = min(len(rows) - 1, finding.place.index + 1)
-    start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
-    for gap in gaps_between(legs, start, end):
-        if finding.place.kind == "leg" or RULES[finding.rule].log.needs_no_gap:
-            reason = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
-            return _mark_unjudged(finding, reason, keep_measurements=True)
-    return finding
-
-
-def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Return the finding; mark it as not judged if it concerns the unreached end of a stretch.
-
-    The end is the stretch's last waypoint, or the leg to this waypoint.
-    On this leg, only findings of rules that need the whole leg are marked, unless they failed.
-    """
-    leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
-    is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
-    is_last_leg = finding.place.kind == "leg" and finding.place.index == leg
-    if is_unreached:
-        return _mark_unjudged(finding, stretch_end_text(legs.stretch))
-    if is_last_leg and RULES[finding.rule].log.needs_full_leg:
-        return (
-            _mark_unjudged(finding, f"flown in part: {stretch_end_text(legs.stretch)}")
-            if finding.ok is not False
-            else finding
-        )
-    return finding
-
-
-def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches: for each rule, place and check, a failure replaces a pass.
-
-    A pass replaces an unjudged finding.
-    """
-    merged: dict[tuple[str, Place, str], Finding] = {}
-    for findings in findings_by_stretch:
-        for finding in findings:
-            key = (finding.rule, finding.place, finding.check)
-            previous = merged.get(key)
-            if previous is None or _merge_precedence(finding) > _merge_precedence(previous):
-                merged[key] = finding
-    rules = list(dict.fromkeys(finding.rule for finding in merged.values()))
-    return tuple(finding for rule in rules for finding in merged.values() if finding.rule == rule)
 
 
 def _merge_precedence(finding: Finding) -> int:

@@ -1,7 +1,7 @@
 """Compare an imported flight with a simulated flight of the same mission: leg by leg, turn by turn."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -167,7 +167,18 @@ def compare_with_model(
     )
     corners = [measure_passes(flight_requirements, track) for flight_requirements, track in pairs]
     turns = tuple(_turn_pair(stretch_legs.first, k, pairs, corners) for k in range(1, requirements.legs))
-    flown_profile, model_profile = profiles
+    # The differences between both flights by quantity, if both know it at the same points.
+    (flown_profile, model_profile), spreads = profiles, []
+    for name, unit, factor in (
+        ("cross_track", "m", 1.0),
+        ("height_error", "m", 1.0),
+        ("ground_speed", "m/s", 1.0),
+        ("bank", "deg", 180.0 / math.pi),
+    ):
+        difference = factor * np.abs(getattr(flown_profile, name) - getattr(model_profile, name))
+        known = difference[np.isfinite(difference)]
+        if known.size:
+            spreads.append(Spread(name, unit, float(np.median(known)), float(np.percentile(known, 95.0))))
     return Reflight(
         stretch=stretch_legs.stretch,
         setup=setup,
@@ -180,7 +191,7 @@ def compare_with_model(
         first=stretch_legs.first,
         legs=legs,
         turns=turns,
-        spreads=_make_spreads(flown_profile, model_profile),
+        spreads=tuple(spreads),
         stands_in=stands_in,
     )
 
@@ -239,39 +250,28 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     profiles: profiles of the flown and of the simulated flight.
     """
 
-    def pair(name: str, reduce: str) -> tuple[float, float]:
-        """Return one quantity of the flown and of the simulated leg, each reduced to one number."""
-        flown_value, model_value = (_reduce_values(getattr(profile, name)[rows], reduce) for profile in profiles)
-        return flown_value, model_value
+    def pair(name: str, reduce: Callable[[Floats], float]) -> tuple[float, float]:
+        """Return one quantity of the flown and of the simulated leg, reduced to one number; NaN if it is unknown."""
+        columns = [getattr(profile, name)[rows] for profile in profiles]
+        flown_values, model_values = (column[np.isfinite(column)] for column in columns)
+        return (
+            float(reduce(flown_values)) if flown_values.size else math.nan,
+            float(reduce(model_values)) if model_values.size else math.nan,
+        )
 
-    flown_bank, model_bank = pair("bank", "size")
+    def farthest(values: Floats) -> float:
+        """Return the value with the largest absolute value."""
+        return float(values[np.argmax(np.abs(values))])
+
+    flown_bank, model_bank = pair("bank", lambda values: np.abs(values).max())
     return LegPair(
         leg,
-        cross_track=pair("cross_track", "farthest"),
-        height_error=pair("height_error", "farthest"),
-        ground_speed=pair("ground_speed", "mean"),
+        cross_track=pair("cross_track", farthest),
+        height_error=pair("height_error", farthest),
+        ground_speed=pair("ground_speed", np.mean),
         bank=(math.degrees(flown_bank), math.degrees(model_bank)),
-        energy=pair("energy", "span"),
+        energy=pair("energy", lambda values: values[-1] - values[0]),
     )
-
-
-def _reduce_values(values: Floats, reduce: str) -> float:
-    """Reduce the finite values to one number; NaN if there are none.
-
-    reduce: "mean", "span" (last value minus first), "size" (largest absolute value), or "farthest" (the value with the
-        largest absolute value).
-    """
-    known_values = values[np.isfinite(values)]
-    if not known_values.size:
-        return math.nan
-    match reduce:
-        case "mean":
-            return float(known_values.mean())
-        case "span":
-            return float(known_values[-1] - known_values[0])
-        case "size":
-            return float(np.abs(known_values).max())
-    return float(known_values[np.argmax(np.abs(known_values))])
 
 
 def _turn_pair(
@@ -304,24 +304,3 @@ def _turn_pair(
         bank=value_pair(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
         passed=value_pair(flown_pass.distance, model_pass.distance),
     )
-
-
-def _make_spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
-    """Summarize the differences between both flights by quantity.
-
-    Quantities that are never known in both flights at the same point are left out.
-    """
-    spreads = []
-    for name, unit, factor in (
-        ("cross_track", "m", 1.0),
-        ("height_error", "m", 1.0),
-        ("ground_speed", "m/s", 1.0),
-        ("bank", "deg", 180.0 / math.pi),
-    ):
-        difference = factor * np.abs(getattr(flown_profile, name) - getattr(model_profile, name))
-        known_differences = difference[np.isfinite(difference)]
-        if known_differences.size:
-            spreads.append(
-                Spread(name, unit, float(np.median(known_differences)), float(np.percentile(known_differences, 95.0)))
-            )
-    return tuple(spreads)

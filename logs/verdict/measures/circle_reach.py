@@ -63,8 +63,29 @@ def find_hazards(
                 and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius
             ):
                 missile_hazards.append(f"missile {threat_label(threat.name or '', number)} is in range")
+    # Ground that is unknown, too close below, or too far below for a height limit.
+    ground_hazards, terrain, limits = [], scenario.terrain, requirements.limits
+    if terrain is not None:
+        rings, to_pixel = _ring_points(center, reach, terrain.spacing), terrain.to_pixel.record
+        clearances, _ = path_clearance(terrain.heights, to_pixel, _points_at_altitude(rings, min_altitude))
+        # The clearance of segments over unknown ground is NaN.
+        if np.isnan(clearances).any():
+            ground_hazards.append("the terrain is unknown")
+        clearance = float(np.nanmin(clearances, initial=math.inf))
+        if clearance < limits.min_clearance - CLEARANCE_TOLERANCE_M:
+            ground_text = f"only {clearance:.0f} m below" if clearance >= 0.0 else f"{-clearance:.0f} m above"
+            ground_hazards.append(f"the ground is {ground_text} ({limits.min_clearance:.0f} m are required)")
+        max_height_limit = scenario.limits.max_height_m
+        if max_height_limit is not None:
+            # With ground and path turned upside down, the minimum clearance is the maximum height above ground.
+            inverted_points = _points_at_altitude(rings, -max_altitude)
+            inverted_clearances, _ = path_clearance(-terrain.heights, to_pixel, inverted_points)
+            max_height = -float(np.nanmin(inverted_clearances, initial=math.inf))
+            if max_height > max_height_limit + HEIGHT_TOLERANCE_M:
+                height_text = f"{max_height:.0f} m below, more than the {max_height_limit:.0f} m allowed"
+                ground_hazards.append(f"the ground is {height_text}")
     return [
-        *_ground_hazards(requirements, center, min_altitude, max_altitude, reach),
+        *ground_hazards,
         *missile_hazards,
         *_zone_hazards(requirements, center, min_altitude, max_altitude, reach),
         *edge_hazards,
@@ -89,41 +110,6 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     if not math.isfinite(reach):
         return reach, ["the wind is too strong to fly this circle"]
     return reach, find_hazards(requirements, requirements.points[-1, :2], altitude, altitude, reach)
-
-
-def _ground_hazards(
-    requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
-) -> list[str]:
-    """Describe ground within reach that is unknown, too close below, or too far below for a height limit.
-
-    Return [] without terrain.
-
-    center: east and north, m, (2,).
-    min_altitude, max_altitude: altitudes of the flight, m AMSL.
-    reach: maximum horizontal distance from the center, m.
-    """
-    terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
-    if terrain is None:
-        return []
-    rings = _ring_points(center, reach, terrain.spacing)
-    clearances, _ = path_clearance(terrain.heights, terrain.to_pixel.record, _points_at_altitude(rings, min_altitude))
-    hazards = []
-    # The clearance of segments over unknown ground is NaN.
-    if np.isnan(clearances).any():
-        hazards.append("the terrain is unknown")
-    min_clearance = float(np.nanmin(clearances, initial=math.inf))
-    if min_clearance < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
-        ground_text = f"only {min_clearance:.0f} m below" if min_clearance >= 0.0 else f"{-min_clearance:.0f} m above"
-        hazards.append(f"the ground is {ground_text} ({requirements.limits.min_clearance:.0f} m are required)")
-    if limits.max_height_m is not None:
-        # With ground and path turned upside down, the minimum clearance is the maximum height above ground.
-        inverted_clearances, _ = path_clearance(
-            -terrain.heights, terrain.to_pixel.record, _points_at_altitude(rings, -max_altitude)
-        )
-        max_height = -float(np.nanmin(inverted_clearances, initial=math.inf))
-        if max_height > limits.max_height_m + HEIGHT_TOLERANCE_M:
-            hazards.append(f"the ground is {max_height:.0f} m below, more than the {limits.max_height_m:.0f} m allowed")
-    return hazards
 
 
 def _zone_hazards(

@@ -543,7 +543,26 @@ def measure_overlap(
     if measure.side is None:
         # No two sufficiently usable lines are neighbours: use the usable parts of all lines.
         measure = _with_side_overlap(measure, requirements, survey, strips)
-    return _with_front_overlap(measure, survey, strips)
+    # The lowest front overlap, between successive photos on a line.
+    lowest_overlap = math.inf
+    for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
+        if strip is None or line.photo <= 0.0 or not strip.is_usable.any():
+            continue
+        spacing = np.maximum(line.photo, plan.camera.interval * strip.speeds)[strip.is_usable]
+        heights = strip.heights[strip.is_usable]
+        overlaps = _overlaps(spacing, plan.camera.along, heights)
+        lowest_index = int(np.argmin(overlaps))
+        if overlaps[lowest_index] < lowest_overlap:
+            lowest_overlap = float(overlaps[lowest_index])
+            measure = replace(
+                measure,
+                front=max(0.0, lowest_overlap),
+                line=number,
+                photo_spacing=float(spacing[lowest_index]),
+                height=max(0.0, float(heights[lowest_index])),
+                is_camera_limited=bool(spacing[lowest_index] > line.photo),
+            )
+    return measure
 
 
 def _line_strip(
@@ -581,31 +600,6 @@ def _line_strip(
     return _Strip(rows.position, heights, speeds, rows.crab, is_usable, usable_fraction, unknown_fraction)
 
 
-def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
-    """Return a copy of the measure with the minimum front overlap, between successive photos on a line."""
-    camera, lowest_overlap = measure.camera, math.inf
-    for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
-        if strip is None or line.photo <= 0.0 or not strip.is_usable.any():
-            continue
-        spacing = np.maximum(line.photo, camera.interval * strip.speeds)[strip.is_usable]
-        heights = strip.heights[strip.is_usable]
-        overlaps = _overlaps(spacing, camera.along, heights)
-        lowest_index = int(np.argmin(overlaps))
-        if overlaps[lowest_index] < lowest_overlap:
-            lowest_overlap = float(overlaps[lowest_index])
-            lowest_spacing = float(spacing[lowest_index])
-            is_slow = bool(spacing[lowest_index] > line.photo)
-            measure = replace(
-                measure,
-                front=max(0.0, lowest_overlap),
-                line=number,
-                photo_spacing=lowest_spacing,
-                height=max(0.0, float(heights[lowest_index])),
-                is_camera_limited=is_slow,
-            )
-    return measure
-
-
 def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
     """Return the overlaps of neighbouring photos as fractions of a photo, (n,); negative for a gap.
 
@@ -627,7 +621,10 @@ def _with_side_overlap(
     Two lines are neighbours if they run side by side, no other line lies between them (even one that was lost), and
     their distance is close to the survey's spacing.  A much larger distance spans a notch in the survey's area.
     """
-    ranks, offsets = _lateral_ranks(survey), np.array(survey.offsets)
+    # Rank of each line from one side of the survey to the other; lines at about the same offset share a rank.
+    offsets, ranks = np.array(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
+    lateral_order = np.argsort(offsets)
+    ranks[lateral_order[1:]] = np.cumsum(np.diff(offsets[lateral_order]) > _SAME_POSITION_SPACINGS * survey.spacing)
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
     end_distances = [axis.project(corner_points)[0] for corner_points in corners]
@@ -637,7 +634,7 @@ def _with_side_overlap(
     step_middles = (np.arange(count) + 0.5) * length / count
     # The line that was last seen at each step: offset (m), height above ground (m), crab angle (rad) and number.
     previous_line, lowest_overlap = np.full((4, count), np.nan), math.inf
-    for number in np.argsort(survey.offsets).tolist():
+    for number in lateral_order.tolist():
         strip, along = strips[number], end_distances[number] - min_along
         on_line = (step_middles >= along.min()) & (step_middles <= along.max())
         this_line = np.full((4, count), np.nan)
@@ -697,14 +694,3 @@ def _common_area(camera: Camera, distance: float, height: float, crabs: tuple[fl
     x = across * math.cos(turn) - along * math.sin(turn) - distance * math.cos(crabs[1])
     y = across * math.sin(turn) + along * math.cos(turn) - distance * math.sin(crabs[1])
     return float(((2.0 * np.abs(x) <= camera.across * height) & (2.0 * np.abs(y) <= camera.along * height)).mean())
-
-
-def _lateral_ranks(survey: Survey) -> NDArray[np.int64]:
-    """Return each photo line's rank from one side of the survey to the other, (n,).
-
-    Lines at about the same offset share a rank.
-    """
-    order, ranks = np.argsort(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
-    gaps = np.diff(np.array(survey.offsets)[order])
-    ranks[order[1:]] = np.cumsum(gaps > _SAME_POSITION_SPACINGS * survey.spacing)
-    return ranks

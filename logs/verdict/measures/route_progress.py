@@ -6,7 +6,6 @@ recorded about itself are not read.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,7 +137,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
 
 def _sample_route(route: Route, spacing: float) -> _Samples:
     """Sample the legs of a route about every `spacing` (m); each loiter is one sample."""
-    points = route.positions[:, :2]
+    points, rtl_circle = route.positions[:, :2], rtl_arrival_circle(route)
     positions, radii, distances = [points[:1]], [np.zeros(1)], [np.zeros(1)]
     sample_of_waypoint = np.zeros(len(points), dtype=np.int64)
     sample_count = 1
@@ -165,25 +164,17 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
                 for k in range(waypoint, len(points))
                 if route.stops[k] == route.stops[waypoint] and route.arc_radii[waypoint : k + 1].all()
             ]
-            positions[-1][-1], radii[-1][-1] = _loiter_center(route, corners)
+            # Only the last arcs of an RTL are its loiter; earlier arcs are turns.
+            is_rtl_loiter = (
+                corners[0] in rtl_waypoints(route) and not route.arc_radii[corners[-1] + 1 : route.rtl_end].any()
+            )
+            if rtl_circle is not None and is_rtl_loiter:
+                positions[-1][-1], radii[-1][-1] = rtl_circle
+            else:
+                center = 0.5 * (points[corners].min(axis=0) + points[corners].max(axis=0))
+                positions[-1][-1] = center
+                radii[-1][-1] = float(np.hypot(*(points[corners] - center).T).max()) + _LOITER_MARGIN_M
     return _Samples(np.concatenate(positions), np.concatenate(radii), np.concatenate(distances), sample_of_waypoint)
-
-
-def _loiter_center(route: Route, waypoints: Sequence[int]) -> tuple[Floats, float]:
-    """Return the center of a loiter, m, (2,), and the radius within which it is flown, m.
-
-    waypoints: waypoints at the loiter's corners.
-    """
-    loiter_circle = rtl_arrival_circle(route)
-    # Only the last arcs of an RTL are its loiter; earlier arcs are turns.
-    is_rtl_loiter = (
-        waypoints[0] in rtl_waypoints(route) and not route.arc_radii[waypoints[-1] + 1 : route.rtl_end].any()
-    )
-    if loiter_circle is not None and is_rtl_loiter:
-        return loiter_circle
-    corners = route.positions[waypoints, :2]
-    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    return center, float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
 
 
 def rtl_waypoints(route: Route) -> range:

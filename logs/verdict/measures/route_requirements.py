@@ -22,7 +22,7 @@ from aircraft.path_limits import (
     roll_reversal_length,
     turn_radius_between,
 )
-from flight.guidance.path import FlyByPath, path_polyline
+from flight.guidance.path import path_polyline
 from flight.mission.fences import fence_zones
 from flight.mission.ground_phases import GroundPhases
 from flight.mission.route import Route
@@ -102,21 +102,15 @@ def judged_airspace(setup: FlightSetup) -> Airspace:
     except (MissionError, ValueError) as error:
         fence_fault = str(error)
     zones = (*setup.scenario.zones, *mission_zones) if mission_zones else setup.scenario.zones
-    return Airspace(zones, _cached_records(zones), fence_fault, len(setup.scenario.zones))
+    records = next((records for cached_zones, records in _last_records if cached_zones is zones), None)
+    if records is None:
+        records = zone_records(zones)
+        _last_records[:] = [(zones, records)]
+    return Airspace(zones, records, fence_fault, len(setup.scenario.zones))
 
 
 # Zones converted last and their records: converting a thousand zones takes longer than judging them.
 _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
-
-
-def _cached_records(zones: tuple[Zone, ...]) -> ZoneRecords:
-    """Return the records of zones, cached for the last tuple of zones; do not modify them."""
-    for cached_zones, records in _last_records:
-        if cached_zones is zones:
-            return records
-    records = zone_records(zones)
-    _last_records[:] = [(zones, records)]
-    return records
 
 
 def with_fence_zones(setup: FlightSetup) -> FlightSetup:
@@ -223,7 +217,16 @@ def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirem
             reversal[leg] = roll_reversal_length(
                 table, course_east, course_north, min_altitude, radius[leg], radius[leg + 1], *downwind_vector(table)
             )
-    limit = _sharpest_turns(route, runs, min_radius, length_before, length_after, reversal)
+    # The sharpest turn that fits between the neighbouring turns: 0 if the radius is infinite, pi at the route's ends.
+    limit = np.full(count, math.pi)
+    for waypoint in range(1, count - 1):
+        before, after = available_lengths(runs, length_before, length_after, reversal, waypoint)
+        if not math.isfinite(min_radius[waypoint]):
+            limit[waypoint] = 0.0
+        elif route.fly_over[waypoint]:
+            limit[waypoint] = sharpest_fly_over_turn(after / min_radius[waypoint])
+        else:
+            limit[waypoint] = 2.0 * math.atan(min(before, after) / min_radius[waypoint])
     return TurnRequirements(turns, min_radius, radius, length_before, length_after, reversal, limit)
 
 
@@ -260,30 +263,6 @@ def available_lengths(
         max(runs[waypoint - 1] - length_after[waypoint - 1], 0.5 * runs[waypoint - 1]) - reversal[waypoint - 1],
         max(runs[waypoint] - length_before[waypoint + 1], 0.5 * runs[waypoint]) - reversal[waypoint],
     )
-
-
-def _sharpest_turns(
-    route: Route, runs: Floats, min_radius: Floats, lengths_before: Floats, lengths_after: Floats, reversal: Floats
-) -> Floats:
-    """Return the sharpest turn at each waypoint that fits between the neighbouring turns, rad, (w,).
-
-    It is 0 if the turn radius is infinite, and pi at the ends of the route.
-
-    runs: horizontal lengths of the legs, m, (w - 1,).
-    min_radius: smallest turn radius at each waypoint, m, (w,).
-    lengths_before, lengths_after, reversal: see `available_lengths`.
-    """
-    limits = np.full(len(min_radius), math.pi)
-    for waypoint in range(1, len(min_radius) - 1):
-        if not math.isfinite(min_radius[waypoint]):
-            limits[waypoint] = 0.0
-            continue
-        length_before, length_after = available_lengths(runs, lengths_before, lengths_after, reversal, waypoint)
-        if route.fly_over[waypoint]:
-            limits[waypoint] = sharpest_fly_over_turn(length_after / min_radius[waypoint])
-        else:
-            limits[waypoint] = 2.0 * math.atan(min(length_before, length_after) / min_radius[waypoint])
-    return limits
 
 
 def sharpest_fly_over_turn(radii: float) -> float:
@@ -520,6 +499,16 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     if possible_bank > limits.max_bank:
         possible_limits = replace(limits, max_bank=possible_bank)
         possible_turns = turn_requirements(route, leg_performance(possible_limits, winds))
+    # Distance at which the fly-by path passes each waypoint.
+    fly_by_offsets = np.zeros(len(points))
+    for waypoint in np.flatnonzero(np.isfinite(turns.radius) & ~route.fly_over).tolist():
+        radius = float(turns.radius[waypoint])
+        offset = fly_by_offset(abs(float(turns.turns[waypoint])), radius)
+        fly_by_offsets[waypoint] = min(offset, MAX_FLY_BY_OFFSET_RADII * radius)
+    # The fly-by path with the time at each point.  The airspeed replaces a ground speed that is not finite.
+    path_points, path_legs = path_polyline(setup.path)
+    path_speeds = np.where(np.isfinite(speeds), speeds, route.leg_airspeeds)[path_legs]
+    path_times = np.cumsum(np.hypot(*np.diff(path_points[:, :2], axis=0).T) / path_speeds)
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
     return RouteRequirements(
@@ -536,7 +525,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         length_after=turns.length_after,
         reversal=turns.reversal,
         blend=_blend_lengths(setup, route, points, runs, turns),
-        fly_by_offset=_fly_by_offsets(route, turns),
+        fly_by_offset=fly_by_offsets,
         turn_limit=turns.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
         dive=dive,
@@ -547,7 +536,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         possible_turn_limit=possible_turns.limit if envelope else np.full(len(points), math.inf),
         possible_min_radius=possible_turns.min_radius,
         ground_speed=speeds,
-        path=_planned_path(setup.path, route, speeds),
+        path=PlannedPath(path_points, path_legs, np.concatenate([[0.0], path_times])),
         envelope=envelope,
         airspace=judged_airspace(setup),
         surveys=judged_surveys(setup),
@@ -563,34 +552,26 @@ _MAX_KEPT_SURVEYS = 4
 def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     """Return the surveys of a setup's mission whose photo lines are judged, cached for the last setups.
 
-    A plan made by planfly has no surveys.  In other missions, these are the surveys that switch the camera.  If the
-    scenario states `surveys = "lines"`, all legs that form a survey pattern are included.
+    A plan made by planfly has no surveys, nor has a mission whose scenario states `surveys = "path"`.  In other
+    missions, these are the surveys that switch the camera.  If the scenario states `surveys = "lines"`, all legs that
+    form a survey pattern are included.
     """
-    for cached_setup, surveys in tuple(_last_surveys):
+    for cached_setup, cached_surveys in tuple(_last_surveys):
         if cached_setup is setup:
-            return surveys
-    surveys = _search_surveys(setup)
+            return cached_surveys
+    mode = setup.scenario.limits.surveys
+    surveys: tuple[Survey, ...] = ()
+    if setup.plan is None and mode != "path":
+        camera = camera_spacing(setup.mission, setup.route)
+        # If no item switches the camera, no line takes photos.
+        if mode == "lines" or camera.any():
+            photo_plans = [
+                (survey.photo, survey.turn_around) for survey in setup.mission.survey_plans if survey.photo is not None
+            ]
+            found_surveys = find_surveys(setup.route, camera, photo_plans)
+            surveys = tuple(survey for survey in found_surveys if mode == "lines" or survey.takes_photos())
     _last_surveys[:] = [(setup, surveys), *_last_surveys[: _MAX_KEPT_SURVEYS - 1]]
     return surveys
-
-
-def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
-    """Find the surveys of a setup's mission whose photo lines are judged; see `judged_surveys`.
-
-    There are none in a flight of a plan, or if the scenario's limits state `surveys = "path"`.
-    """
-    mode = setup.scenario.limits.surveys
-    if setup.plan is not None or mode == "path":
-        return ()
-    photo_plans = [
-        (survey.photo, survey.turn_around) for survey in setup.mission.survey_plans if survey.photo is not None
-    ]
-    camera = camera_spacing(setup.mission, setup.route)
-    if mode != "lines" and not camera.any():
-        # If no item switches the camera, no line takes photos.
-        return ()
-    surveys = find_surveys(setup.route, camera, photo_plans)
-    return tuple(survey for survey in surveys if mode == "lines" or survey.takes_photos())
 
 
 def true_airspeed_route(setup: FlightSetup) -> Route:
@@ -617,17 +598,6 @@ def true_airspeed_route(setup: FlightSetup) -> Route:
     return route.with_fields(airspeed=route.leg_airspeeds * factors)
 
 
-def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
-    """Return the fly-by path as a polyline, with the time at each point.
-
-    ground_speed: ground speed on each leg, m/s; the leg's airspeed replaces a value that is not finite.
-    """
-    points, legs = path_polyline(path)
-    speed = np.where(np.isfinite(ground_speed), ground_speed, route.leg_airspeeds)
-    runs = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(runs / speed[legs])]))
-
-
 def _leg_limits(
     route: Route, performance: LegPerformance, points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
@@ -647,17 +617,6 @@ def _leg_limits(
             speeds[leg] = math.nan
         climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, altitude) for altitude in altitudes], axis=0)
     return climb, dive, speeds
-
-
-def _fly_by_offsets(route: Route, turns: TurnRequirements) -> Floats:
-    """Return the distance at which the fly-by path passes each waypoint, (w,) m."""
-    offsets = np.zeros(len(turns.radius))
-    for waypoint in np.flatnonzero(np.isfinite(turns.radius) & ~route.fly_over).tolist():
-        radius = float(turns.radius[waypoint])
-        offsets[waypoint] = min(
-            fly_by_offset(abs(float(turns.turns[waypoint])), radius), MAX_FLY_BY_OFFSET_RADII * radius
-        )
-    return offsets
 
 
 def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turns: TurnRequirements) -> Floats:

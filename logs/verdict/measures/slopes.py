@@ -230,12 +230,46 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
     if not aligned.has_flown(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
-    height_error, is_short = _height_error(requirements, leg, aligned.track.position[rows])
-    full_time, idle_time, speed_loss, speed_gain = _saturation_times(requirements, aligned, leg)
+    # Largest altitude error: from the leg's line outside the blends, or between the turns if the leg has only blends.
+    # A leg that follows the ground is compared with its demanded height above known ground, between the turns.
+    position, is_over_ground = aligned.track.position[rows], follows_ground(requirements, leg)
+    distance_along, _ = project_onto_leg(requirements, leg, position)
+    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
+    is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    is_short = not is_over_ground and not is_inside.any()
+    if is_over_ground or is_short:
+        span_start, span_end = straight_span(requirements, leg, 0.0)
+        is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    demanded = requirements.points[leg, 2] + distance_along[is_inside] * math.tan(requirements.slopes[leg])
+    if is_over_ground:
+        demanded = demanded_altitudes(requirements, leg, position[is_inside])
+    errors = position[is_inside, 2] - demanded
+    errors = errors[np.isfinite(errors)] if is_over_ground else errors
+    height_error = float(errors[np.argmax(np.abs(errors))]) if errors.size else None
+    track, steady = aligned.track, steady_rows(requirements, aligned, leg)
+    full_time = idle_time = speed_loss = speed_gain = 0.0
+    if steady.stop - steady.start >= 2:
+        is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, steady)
+        full_time, idle_time = float(is_at_full.sum() * aligned.tick), float(is_at_idle.sum() * aligned.tick)
+        commanded = float(requirements.route.leg_airspeeds[leg])
+        error = track.airspeed[steady].astype(np.float64) - commanded
+        # A gust along the track changes the airspeed but not the energy.  So the error in the mean wind counts, too.
+        mean_wind = requirements.setup.scenario.wind_velocities(track.position[steady], track.time[steady])
+        east, north = (track.velocity[steady, :2] - mean_wind[:, :2]).T
+        up = track.velocity[steady, 2].astype(np.float64)
+        gust_free_error = np.asarray(np.sqrt(east**2 + north**2 + up**2)) - commanded
+        lift_gain = aligned.lift_gain[steady]
+        speed_deficit = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
+        speed_excess = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
+        # A log may lack the airspeed in some rows.
+        is_known = np.isfinite(speed_deficit) & np.isfinite(speed_excess)
+        row_count = max(1, round(SATURATED_TIME_S / aligned.tick))
+        speed_loss = _max_mean_in_mask(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
+        speed_gain = _max_mean_in_mask(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
     # Time with the pitch at the autopilot's upper limit, s; an imported flight has no such limit.
     pitch_limit_time = 0.0
     if requirements.setup.imported_log is None:
-        pitch = aligned.track.attitude[aligned.leg_rows(leg), PITCH]
+        pitch = track.attitude[rows, PITCH]
         min_pitch = requirements.setup.autopilot.speeds.max_pitch - PITCH_LIMIT_TOLERANCE_RAD
         pitch_limit_time = float((pitch >= min_pitch).sum() * aligned.tick)
     return SlopeMeasure(
@@ -252,37 +286,6 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
     )
 
 
-def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest altitude error on a leg (m, with its sign), and True if the leg has only blends.
-
-    Blends are the parts next to the turns on which the slope changes.  The error is measured from the leg's line,
-    outside the blends.  If the leg has only blends, it is measured between the turns, and is None if no row lies there.
-    A leg that follows the ground is compared with its demanded height above ground.
-    position: positions of the track on the leg, m, (n, 3).
-    """
-    if follows_ground(requirements, leg):
-        # Largest error from the demanded height above ground between the leg's turns; None if no row lies there over
-        # known ground.
-        distance_along, _ = project_onto_leg(requirements, leg, position)
-        span_start, span_end = straight_span(requirements, leg, 0.0)
-        straight_positions = position[(distance_along >= span_start) & (distance_along <= span_end)]
-        errors = straight_positions[:, 2] - demanded_altitudes(requirements, leg, straight_positions)
-        errors = errors[np.isfinite(errors)]
-        return float(errors[np.argmax(np.abs(errors))]) if errors.size else None, False
-    distance_along, _ = project_onto_leg(requirements, leg, position)
-    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
-    is_inside = (distance_along >= span_start) & (distance_along <= span_end)
-    is_short = not is_inside.any()
-    if is_short:
-        span_start, span_end = straight_span(requirements, leg, 0.0)
-        is_inside = (distance_along >= span_start) & (distance_along <= span_end)
-        if not is_inside.any():
-            return None, True
-    line_altitudes = requirements.points[leg, 2] + distance_along[is_inside] * math.tan(requirements.slopes[leg])
-    height_errors = position[is_inside, 2] - line_altitudes
-    return float(height_errors[np.argmax(np.abs(height_errors))]), is_short
-
-
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
     """Return the rows of a leg from the time at which its commanded airspeed can be reached; may be empty."""
     rows = aligned.leg_rows(leg)
@@ -290,36 +293,6 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
     start = float(aligned.track.time[rows.start]) + change / MAX_STEADY_ACCELERATION_MPS2
     return slice(max(rows.start, int(np.searchsorted(aligned.track.time, start))), rows.stop)
-
-
-def _saturation_times(
-    requirements: RouteRequirements, aligned: AlignedTrack, leg: int
-) -> tuple[float, float, float, float]:
-    """Return times at full and idle throttle (s), and speed loss and gain (m/s), as in `SlopeMeasure`."""
-    rows = steady_rows(requirements, aligned, leg)
-    track = aligned.track
-    if rows.stop - rows.start < 2:
-        return 0.0, 0.0, 0.0, 0.0
-    tick = aligned.tick
-    is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
-    commanded = float(requirements.route.leg_airspeeds[leg])
-    error = track.airspeed[rows].astype(np.float64) - commanded
-    # A gust along the track changes the airspeed but not the energy.  So the error in the mean wind counts, too.
-    mean_wind = requirements.setup.scenario.wind_velocities(track.position[rows], track.time[rows])
-    east = track.velocity[rows, 0] - mean_wind[:, 0]
-    north = track.velocity[rows, 1] - mean_wind[:, 1]
-    gust_free_error = (
-        np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2)) - commanded
-    )
-    row_count = max(1, round(SATURATED_TIME_S / tick))
-    lift_gain = aligned.lift_gain[rows]
-    speed_deficit = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
-    speed_excess = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
-    # A log may lack the airspeed in some rows.
-    is_known = np.isfinite(speed_deficit) & np.isfinite(speed_excess)
-    speed_loss = _max_mean_in_mask(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
-    speed_gain = _max_mean_in_mask(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
-    return float(is_at_full.sum() * tick), float(is_at_idle.sum() * tick), speed_loss, speed_gain
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:

@@ -147,7 +147,17 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     if ends_at_loiter and (reach := return_loiter_reach(route, usable_track)):
         # A completed loiter counts as flown, however wide the bank limit and the wind made it.
         arrival_radius[rtl_waypoints(route)] = np.maximum(arrival_radius[rtl_waypoints(route)], reach)
-    progress = _advance_target_to_arrival(usable_track, progress, centers, arrival_radius)
+    # Inside an arrival circle that the track enters and never leaves, the aircraft already flies to the next waypoint.
+    target, first_rows, last_rows = progress.target, progress.first.copy(), progress.last.copy()
+    while target + 1 < len(centers):
+        distances = np.hypot(*(usable_track.position[:, :2] - centers[target]).T)
+        rows_outside = np.flatnonzero(distances > arrival_radius[target])
+        entry_row = int(rows_outside[-1]) + 1 if rows_outside.size else 0
+        if entry_row > last_row:
+            break
+        target += 1
+        first_rows[target], last_rows[target] = max(int(first_rows[target - 1]), entry_row), last_row
+    progress = replace(progress, first=first_rows, last=last_rows, target=target)
     rows, distance = _find_passage_rows(usable_track, apexes, progress)
     distances = np.hypot(*(usable_track.position[rows, :2] - centers).T)
     # A waypoint was passed if the track continues after its nearest row, or ends within its arrival circle.  A waypoint
@@ -158,7 +168,15 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     passed &= np.arange(len(rows)) <= progress.target
     passed = np.logical_and.accumulate(passed)
     rows[~passed] = last_row
-    _advance_last_leg(requirements, usable_track, rows, passed, centers, arrival_radius)
+    # If the track ends inside the arrival circle of the last passed waypoint, before the waypoint itself, the autopilot
+    # is already on the next leg: the waypoint's row is then the entry into this circle.
+    last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
+    if 0 < last_passed < len(rows) - 1 and rows[last_passed] == last_row and not route.arc_radii[last_passed] > 0.0:
+        previous_row = int(rows[last_passed - 1])
+        distances = np.hypot(*(usable_track.position[previous_row:, :2] - centers[last_passed]).T)
+        rows_outside = np.flatnonzero(distances > arrival_radius[last_passed])
+        entry_row = previous_row + (int(rows_outside[-1]) + 1 if rows_outside.size else 0)
+        rows[last_passed] = min(last_row - 1, entry_row)
     steps = np.diff(usable_track.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
     terrain = requirements.setup.scenario.terrain
@@ -209,52 +227,6 @@ def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
             radii[corner] = max(radii[corner], RTL_ARRIVAL_RADIUS_M)
             corner -= 1
     return centers, radii
-
-
-def _advance_target_to_arrival(
-    track: Track, progress: RouteProgress, centers: Floats, arrival_radius: Floats
-) -> RouteProgress:
-    """Advance the target past each waypoint whose arrival circle the track enters and never leaves.
-
-    Inside this circle, the aircraft already flies to the next waypoint.
-    """
-    final_row, target = len(track) - 1, progress.target
-    first_row, last_row = progress.first.copy(), progress.last.copy()
-    while target + 1 < len(centers):
-        rows_outside = np.flatnonzero(np.hypot(*(track.position[:, :2] - centers[target]).T) > arrival_radius[target])
-        entry_row = int(rows_outside[-1]) + 1 if rows_outside.size else 0
-        if entry_row > final_row:
-            break
-        target += 1
-        first_row[target], last_row[target] = max(int(first_row[target - 1]), entry_row), final_row
-    return replace(progress, first=first_row, last=last_row, target=target)
-
-
-def _advance_last_leg(
-    requirements: RouteRequirements,
-    track: Track,
-    rows: RowNumbers,
-    passed: NDArray[np.bool_],
-    centers: Floats,
-    arrival_radius: Floats,
-) -> None:
-    """Move the row of the last passed waypoint back to the entry into its arrival circle, in place.
-
-    This is done only if the track ends inside this circle, before the waypoint itself.  The autopilot is then already
-    on the next leg.
-    """
-    last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
-    if (
-        not 0 < last_passed < len(rows) - 1
-        or rows[last_passed] < len(track) - 1
-        or requirements.setup.route.arc_radii[last_passed] > 0.0
-    ):
-        return
-    distances = np.hypot(*(track.position[:, :2] - centers[last_passed]).T)
-    rows_outside = np.flatnonzero(distances[rows[last_passed - 1] :] > arrival_radius[last_passed])
-    rows[last_passed] = min(
-        rows[last_passed] - 1, rows[last_passed - 1] + (int(rows_outside[-1]) + 1 if rows_outside.size else 0)
-    )
 
 
 def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:

@@ -52,36 +52,43 @@ def measure_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tu
     >>> len(passes) == requirements.legs + 1, passes[1].distance < 60.0
     (True, True)
     """
-    nearest_passes = _nearest_passes(requirements, aligned)
-    times, tick = [time for time, _ in nearest_passes], aligned.tick
+    track_time, rows = aligned.track.time, aligned.rows
+    # Time and distance of the closest approach to each waypoint; the times never decrease.
+    nearest_passes: list[tuple[float, float]] = []
+    start_time = float(track_time[0])
+    for k in range(len(rows)):
+        # The search ends at the row of the next waypoint that has a later row.
+        later_rows = rows[k + 1 :][track_time[rows[k + 1 :]] > max(float(track_time[rows[k]]), start_time)]
+        end_time = float(track_time[later_rows[0]] if later_rows.size else track_time[-1])
+        times, positions = _track_between(aligned, start_time, end_time)
+        distances, fractions = closest_approaches(positions, requirements.points[k])
+        row = int(np.argmin(distances))
+        start_time = float(times[row] + fractions[row] * (times[row + 1] - times[row]))
+        nearest_passes.append((start_time, float(distances[row])))
     passes = []
     for k, (time, distance) in enumerate(nearest_passes):
         overshoot, overrun = None, 0.0
         if 0 < k < requirements.legs:
-            next_time = next(
-                (other_time for other_time in times[k + 1 :] if other_time > time + tick), float(aligned.track.time[-1])
-            )
-            overshoot, overrun = _corner_overshoot(requirements, aligned, k, time, next_time)
+            earliest_time, later_passes = time + aligned.tick, nearest_passes[k + 1 :]
+            next_time = next((later for later, _ in later_passes if later > earliest_time), float(track_time[-1]))
+            leg_length, positions = float(requirements.runs[k]), _track_between(aligned, time, next_time)[1]
+            distance_along, lateral_offset = project_onto_leg(requirements, k, positions)
+            rows_past = np.flatnonzero(distance_along >= NEXT_LEG_FRACTION * leg_length)
+            end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
+            outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
+            if distance_along[0] > leg_length:
+                # The aircraft was already beyond the end of the next leg.
+                overrun = float(distance_along[0]) - leg_length
+            else:
+                overshoot = max(0.0, float(outside_offset[: max(1, end_row)].max()))
+            if overshoot is not None and 0 < end_row < len(distance_along):
+                # Interpolate to the exact end: rows may be a second apart.
+                along_before, along = distance_along[end_row - 1 : end_row + 1].tolist()
+                offset_before, offset = outside_offset[end_row - 1 : end_row + 1].tolist()
+                fraction = (NEXT_LEG_FRACTION * leg_length - along_before) / (along - along_before)
+                overshoot = max(overshoot, offset_before + fraction * (offset - offset_before))
         passes.append(WaypointPass(time, distance, overshoot, overrun))
     return tuple(passes)
-
-
-def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Return time (s) and distance (m) of the closest approach to each waypoint; times never decrease."""
-    time, rows = aligned.track.time, aligned.rows
-    passes: list[tuple[float, float]] = []
-    start_time = float(time[0])
-    for k in range(len(rows)):
-        # The search ends at the row of the next waypoint that has a later row.
-        later_rows = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), start_time)]
-        times, positions = _track_between(
-            aligned, start_time, float(time[later_rows[0]] if later_rows.size else time[-1])
-        )
-        distances, fraction = closest_approaches(positions, requirements.points[k])
-        closest_row = int(np.argmin(distances))
-        start_time = float(times[closest_row] + fraction[closest_row] * (times[closest_row + 1] - times[closest_row]))
-        passes.append((start_time, float(distances[closest_row])))
-    return passes
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
@@ -92,33 +99,6 @@ def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Flo
     time = aligned.track.time
     times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])
-
-
-def _corner_overshoot(
-    requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, start: float, end: float
-) -> tuple[float | None, float]:
-    """Return the overshoot at a waypoint (m) and the overrun (m), as in `WaypointPass`.
-
-    If the aircraft was already beyond the end of the next leg at time `start`, the overshoot is None, and the overrun
-    is its distance from that end.  Otherwise the overrun is 0.
-
-    start, end: times of the closest approach to this waypoint and to the next waypoint, s.
-    """
-    leg_length = float(requirements.runs[waypoint])
-    distance_along, lateral_offset = project_onto_leg(requirements, waypoint, _track_between(aligned, start, end)[1])
-    if distance_along[0] > leg_length:
-        return None, float(distance_along[0]) - leg_length
-    outside_offset = -math.copysign(1.0, float(requirements.turns[waypoint])) * lateral_offset
-    rows_past = np.flatnonzero(distance_along >= NEXT_LEG_FRACTION * leg_length)
-    end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
-    if 0 < end_row < len(distance_along):
-        # Interpolate to the exact end: rows may be a second apart.
-        fraction = (NEXT_LEG_FRACTION * leg_length - distance_along[end_row - 1]) / (
-            distance_along[end_row] - distance_along[end_row - 1]
-        )
-        end_offset = outside_offset[end_row - 1] + fraction * (outside_offset[end_row] - outside_offset[end_row - 1])
-        return max(0.0, float(end_offset), float(outside_offset[:end_row].max())), 0.0
-    return max(0.0, float(outside_offset[: max(1, end_row)].max())), 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +171,24 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoin
         is_after_waypoint & (distance_along >= requirements.runs[waypoint] - next_turn_length), last - first
     )
     rows_around = aligned.rows_around(first + entry_row, first + max(entry_row, exit_row), 1.0)
-    held_bank, radius = _bank_and_radius(aligned, rows_around)
-    angle, tolerance, is_fitted = _course_change(requirements, aligned, waypoint)
+    # Largest one-second mean of the bank, or the mean over less than a second, and smallest radius over one second.
+    bank, radius = np.abs(track.attitude[rows_around, ROLL].astype(np.float64)), math.inf
+    held_bank, time = float(bank.mean()), track.time[rows_around]
+    ticks = int(np.searchsorted(time, time[0] + 1.0))
+    if 1 <= ticks < time.size:
+        bank_sums = np.concatenate([[0.0], np.cumsum(bank)])
+        held_bank = float(((bank_sums[ticks:] - bank_sums[:-ticks]) / ticks).max())
+        course, distance_run = aligned.course[rows_around], aligned.distance_run[rows_around]
+        lengths = np.maximum(distance_run[ticks:] - distance_run[:-ticks], 1e-6)
+        max_curvature = float((np.abs(course[ticks:] - course[:-ticks]) / lengths).max())
+        radius = 1.0 / max_curvature if max_curvature > 1e-9 else math.inf
+    # Neither course is known if its leg was flown too little.
+    angle, tolerance, is_fitted = None, None, False
+    course_before, course_after = (leg_course(requirements, aligned, leg) for leg in (waypoint - 1, waypoint))
+    if course_before is not None and course_after is not None:
+        angle = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
+        tolerance = course_before.tolerance + course_after.tolerance
+        is_fitted = course_before.is_fitted and course_after.is_fitted
     is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
     is_watched &= track.time[first : last + 1] <= track.time[first + exit_row] + SETTLING_WATCH_TIME_S
     course_change = abs(float(aligned.course[first + exit_row] - aligned.course[first + entry_row]))
@@ -227,42 +223,6 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
     """Return the first row at which a mask is True, or `default` if there is none."""
     row = int(np.argmax(mask))
     return row if mask[row] else default
-
-
-def _course_change(
-    requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int
-) -> tuple[float | None, float | None, bool]:
-    """Return the flown course change at a waypoint, its tolerance, and True if both courses are fitted.
-
-    The angles are in rad.  Return None, None, False if either leg was flown too little.
-    """
-    course_before = leg_course(requirements, aligned, waypoint - 1)
-    course_after = leg_course(requirements, aligned, waypoint)
-    if course_before is None or course_after is None:
-        return None, None, False
-    change = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
-    return change, course_before.tolerance + course_after.tolerance, course_before.is_fitted and course_after.is_fitted
-
-
-def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the maximum one-second mean of the bank (rad), and the minimum radius over one second (m).
-
-    If the rows span less than a second, the bank is their mean and the radius is inf.  The radius is also inf without a
-    turn.
-    """
-    time = aligned.track.time[rows]
-    bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
-    ticks = int(np.searchsorted(time, time[0] + 1.0))
-    if ticks < 1 or ticks >= time.size:
-        return float(bank.mean()), math.inf
-    bank_sums = np.concatenate([[0.0], np.cumsum(bank)])
-    held_bank = float(((bank_sums[ticks:] - bank_sums[:-ticks]) / ticks).max())
-    course, distance_run = aligned.course[rows], aligned.distance_run[rows]
-    curvature = np.abs(course[ticks:] - course[:-ticks]) / np.maximum(
-        distance_run[ticks:] - distance_run[:-ticks], 1e-6
-    )
-    max_curvature = float(curvature.max())
-    return held_bank, 1.0 / max_curvature if max_curvature > 1e-9 else math.inf
 
 
 def _arc_overshoot(

@@ -384,7 +384,11 @@ def _bisect_move(
         target_depth = 0.0 if in_order else max(visit.depth, known_depth) + DEPTH_PRECISION
         min_depth, max_depth = depth_bounds(exclusion, part, span, change, math.inf)
         is_certain = max_depth <= target_depth or (in_order and min_depth > 0.0) or max(span, change) <= EDGE_PRECISION
-        is_certain = is_certain or _is_unknown(exclusion, part)
+        if not is_certain:
+            # Nothing can be decided if the ground is unknown at both ends.
+            start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
+            end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
+            is_certain = start_depth != start_depth and end_depth != end_depth
         if not is_certain:
             # A closer bound with the nearest edges takes longer.
             max_distance = max_violation_bound(records, z, move, part, span)
@@ -414,14 +418,6 @@ def _bisect_move(
             copy_move_part(earlier, part)
             copy_move_part(parts[_MAX_PARTS - 1], earlier)
         top += 1
-
-
-@inner
-def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the violation depth is NaN at both ends of a part, because the ground is unknown."""
-    start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
-    end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
-    return start_depth != start_depth and end_depth != end_depth
 
 
 @inner

@@ -155,24 +155,18 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
         return ()
     targets = [return_range.worst.target for return_range in drawn_ranges]
     paths = world.fly(starts.subset(rows).rows, targets, store_positions=True).tracks
-    return tuple(
-        WorstReturn(drawn_range, path, _marked_position(world, drawn_range.worst, path))
-        for drawn_range, path in zip(drawn_ranges, paths, strict=True)
-    )
-
-
-def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> Floats:
-    """Return the position that a drawing marks on the path of a return, m, (3,).
-
-    It is the position nearest to an entered sphere, the lowest position, or the end of the path for a failure without
-    a place, such as a return that does not arrive.
-    """
-    if ret.kind == "threat":
-        distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
-        return np.asarray(path[int(np.argmin(distances))])
-    if ret.kind in ("ground", "low", "safe", "power", "used", "unsure") and not math.isnan(ret.lowest_position[0]):
-        return np.array(ret.lowest_position)
-    return np.asarray(path[-1])
+    worst = []
+    for drawn_range, path in zip(drawn_ranges, paths, strict=True):
+        # A drawing marks the position nearest to an entered sphere, the lowest position, or the end of the path for a
+        # failure without a place, such as a return that does not arrive.
+        ret, position = drawn_range.worst, path[-1]
+        if ret.kind == "threat":
+            distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
+            position = path[int(np.argmin(distances))]
+        elif ret.kind not in ("zone", "lost", "energy", "unknown") and not math.isnan(ret.lowest_position[0]):
+            position = np.array(ret.lowest_position)
+        worst.append(WorstReturn(drawn_range, path, position))
+    return tuple(worst)
 
 
 # ----------------------------------------------------------------------

@@ -28,7 +28,7 @@ from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
 from world.arrays import Codes, Flags, Floats
 from world.highest_ground import highest_in_cells
-from world.kernels import Record, Records, compiled, inlined, inner, record_dtype
+from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Terrain
 from world.wind import mean_wind_speed
 
@@ -113,34 +113,27 @@ def make_glide_map(
     sphere_bottoms = np.full(max_ground.shape, math.inf)
     sphere_tops = np.full(max_ground.shape, -math.inf)
     result = GlideMap(west, south, cell, center_heights, max_ground + margin, sphere_bottoms, sphere_tops)
-    for center, radius in zip(spheres, radii, strict=True):
-        if radius > 0.0:
-            _add_sphere(result, center, float(radius))
+    for center, radius in zip(spheres, radii.tolist(), strict=True):
+        if not radius > 0.0:
+            continue
+        # Each cell around the sphere is checked at its point nearest to the sphere's center.
+        row, column = result.cell_at(float(center[0]), float(center[1]))
+        cell_reach = math.ceil(radius / cell) + 1
+        near = (
+            slice(max(0, row - cell_reach), max(0, row + cell_reach + 1)),
+            slice(max(0, column - cell_reach), max(0, column + cell_reach + 1)),
+        )
+        bottoms, tops = sphere_bottoms[near], sphere_tops[near]
+        norths = south + cell * (near[0].start + np.arange(bottoms.shape[0]))
+        easts = west + cell * (near[1].start + np.arange(bottoms.shape[1]))
+        east_distance = np.maximum(0.0, np.abs(easts[None, :] - center[0]) - 0.5 * cell)
+        north_distance = np.maximum(0.0, np.abs(norths[:, None] - center[1]) - 0.5 * cell)
+        distances = np.hypot(east_distance, north_distance)
+        half_heights = np.sqrt(np.maximum(0.0, radius * radius - distances**2))
+        is_inside = distances < radius
+        bottoms[is_inside] = np.minimum(bottoms, center[2] - half_heights)[is_inside]
+        tops[is_inside] = np.maximum(tops, center[2] + half_heights)[is_inside]
     return result
-
-
-def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
-    """Add one kill sphere to the altitudes `sphere_bottoms` and `sphere_tops` of the cells of `grid`.
-
-    Each cell is checked at its point nearest to the sphere's center.
-    center: (east, north, up), m.
-    radius: m.
-    """
-    row, column = grid.cell_at(float(center[0]), float(center[1]))
-    cell_reach = math.ceil(radius / grid.cell) + 1
-    rows = slice(max(0, row - cell_reach), max(0, row + cell_reach + 1))
-    columns = slice(max(0, column - cell_reach), max(0, column + cell_reach + 1))
-    shape = grid.floor[rows, columns].shape
-    norths = grid.south + grid.cell * (rows.start + np.arange(shape[0]))
-    easts = grid.west + grid.cell * (columns.start + np.arange(shape[1]))
-    east_distance = np.maximum(0.0, np.abs(easts[None, :] - center[0]) - 0.5 * grid.cell)
-    north_distance = np.maximum(0.0, np.abs(norths[:, None] - center[1]) - 0.5 * grid.cell)
-    distances = np.hypot(east_distance, north_distance)
-    half_heights = np.sqrt(np.maximum(0.0, radius * radius - distances**2))
-    is_inside = distances < radius
-    bottoms, tops = grid.sphere_bottoms[rows, columns], grid.sphere_tops[rows, columns]
-    bottoms[is_inside] = np.minimum(bottoms, center[2] - half_heights)[is_inside]
-    tops[is_inside] = np.maximum(tops, center[2] + half_heights)[is_inside]
 
 
 # Side of the square of flat ground that a landing needs, m.
@@ -465,12 +458,14 @@ def _settle_cells(
             altitude = flat_altitudes[k]
             # The position stays below the last column, because the slope is interpolated to the next column.
             slope_position = min(slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_first_altitude) / altitude_step))
+            slope_row = int(slope_position)
             for step_index in range(step_records.shape[0]):
                 step = step_records[step_index]
                 i, j = row - step.north, column - step.east
                 if not (0 <= i < rows and 0 <= j < columns):
                     continue
-                altitude_loss = cell * step.length * _slope_at(slopes, step_index, slope_position)
+                below, above = slopes[step_index, slope_row], slopes[step_index, slope_row + 1]
+                altitude_loss = cell * step.length * (below + (slope_position - slope_row) * (above - below))
                 if not altitude + altitude_loss < min_altitude[i, j]:
                     continue
                 start_altitude = _step_start_altitude(
@@ -484,13 +479,6 @@ def _settle_cells(
                 min_altitude[i, j], destination[i, j] = start_altitude, destination[row, column]
                 next_step[i, j] = step_index
                 _insert_into_band(neighbour, int((start_altitude - first_altitude) / band), band_heads, links)
-
-
-@inlined
-def _slope_at(slopes: Floats, step_index: int, position: float) -> float:
-    """Interpolate the slope of a step at a fractional index into the altitudes of the table."""
-    index = int(position)
-    return slopes[step_index, index] + (position - index) * (slopes[step_index, index + 1] - slopes[step_index, index])
 
 
 @inner

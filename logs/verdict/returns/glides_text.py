@@ -3,7 +3,7 @@
 import math
 
 from flight.autopilots.simulated_returns import ENGINE_FAILURE_REACTION_S
-from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
+from logs.verdict.returns.judge_glides import MARGIN, REACHES, GlideRange, Glides, GlideSite, NotJudged, Reach
 from world.wording import count_text
 
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
@@ -80,62 +80,47 @@ def site_text(site: GlideSite) -> str:
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
     """Describe a time range: best destination, altitude to spare, and the autopilot's own return."""
-    time_text = (
-        f"{glide_range.first:.0f} s"
-        if glide_range.count == 1
-        else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
-    )
-    return (
-        f"engine failure at {time_text}:"
-        f" {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide, glides)}"
-    )
-
-
-def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe the best destination of a time range, and the altitude to spare or missing."""
-    glide = glide_range.lowest_glide
-    altitude_left = glides.altitude_left(glide)
-    worst_text = "" if glide_range.count == 1 else f" (worst case: failure at {glide.time:.0f} s)"
+    glide, altitude_left = glide_range.lowest_glide, glides.altitude_left(glide_range.lowest_glide)
+    time_text, worst_text = f"{glide_range.first:.0f} s", ""
+    if glide_range.count > 1:
+        time_text = f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
+        worst_text = f" (worst case: failure at {glide.time:.0f} s)"
     match glide.reach:
         case "home" | "site":
             site = site_text(glides.sites[glide_range.site])
-            return f"{site} is in reach with {altitude_left:.0f} m of altitude to spare{worst_text}"
+            reach_text = f"{site} is in reach with {altitude_left:.0f} m of altitude to spare{worst_text}"
         case "flat":
             east, north, up = glide.flat_position
-            position_text = f"for example at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            spare_text = f"with {altitude_left:.0f} m of altitude to spare{worst_text}"
-            return f"only flat ground is in reach, {position_text}, {spare_text}"
-        case "nothing":
-            shortfall_text = (
-                "no glide path exists"
-                if math.isinf(altitude_left)
-                else f"at most {-altitude_left:.0f} m of altitude are missing"
+            reach_text = (
+                f"only flat ground is in reach, for example at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL,"
+                f" with {altitude_left:.0f} m of altitude to spare{worst_text}"
             )
-            return f"nothing is in reach: {shortfall_text}"
+        case "nothing" if math.isinf(altitude_left):
+            reach_text = "nothing is in reach: no glide path exists"
+        case "nothing":
+            reach_text = f"nothing is in reach: at most {-altitude_left:.0f} m of altitude are missing"
         case "unknown":
-            return "unknown, because this part lies outside the elevation data"
-
-
-def _own_return_text(glide: Glide, glides: Glides) -> str:
-    """Describe the autopilot's own RTL without thrust as a clause; "" if it is not simulated."""
-    name, own_text = glide.own_return.target.name, f"; {glides.autopilot}'s own return"
-    match glide.own_return.end:
+            reach_text = "unknown, because this part lies outside the elevation data"
+    own_return, name = glide.own_return, glide.own_return.target.name
+    match own_return.end:
         case "arrives":
-            return f"{own_text} arrives over {name}"
+            end_text = f"arrives over {name}"
         case "low":
-            min_height = min(glide.own_return.arrival_height, glide.own_return.clearance)
+            min_height = min(own_return.arrival_height, own_return.clearance)
             height_text = f"{min_height:.0f} m above ground on its way to {name}"
-            return f"{own_text} descends to {height_text}, below the required {MARGIN:.0f} m"
+            end_text = f"descends to {height_text}, below the required {MARGIN:.0f} m"
         case "ground":
-            shortfall = glide.own_return.shortfall
+            shortfall = own_return.shortfall
             distance_text = f"{shortfall / 1000.0:.1f} km" if shortfall >= 1000.0 else f"{shortfall:.0f} m"
-            return f"{own_text} comes down {distance_text} from {name}"
+            end_text = f"comes down {distance_text} from {name}"
         case "threat":
-            return f"{own_text} enters a missile's sphere"
+            end_text = "enters a missile's sphere"
         case "unknown":
-            return f"{own_text} leaves the elevation data"
+            end_text = "leaves the elevation data"
         case "not flown":
-            return ""
+            end_text = ""
+    own_text = f"; {glides.autopilot}'s own return {end_text}" if end_text else ""
+    return f"engine failure at {time_text}: {reach_text}{own_text}"
 
 
 def glide_notes(glides: Glides) -> list[str]:

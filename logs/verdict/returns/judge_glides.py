@@ -22,7 +22,6 @@ from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
 from logs.verdict.returns.glide_map import (
     Cells,
-    GlideMap,
     GlideSlopes,
     PossibleWinds,
     exclude_zones,
@@ -35,7 +34,7 @@ from logs.verdict.returns.glide_map import (
 from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
 from logs.verdict.returns.judge_returns import ReturnWorld
 from logs.verdict.returns.return_starts import ReturnStarts
-from world.arrays import Flags, Floats
+from world.arrays import Floats
 from world.kernels import Record
 from world.scenario import Scenario
 
@@ -267,7 +266,18 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         lefts, reached_cells = remaining_glide_altitudes(rows, altitudes, aircraft, environment, airspeed, bank)
         return lefts, reached_cells, altitudes.min_altitude
 
-    engine_out_returns = _simulate_engine_out_returns(world, starts, slopes)
+    # Without a known path, none of the autopilot's own returns is simulated.  A return that continues with a landing is
+    # simulated only up to its loiter.
+    targets = [world.target(row) for row in rows]
+    engine_out_returns = [
+        EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets
+    ]
+    if world.is_simulated and world.autopilot.returns.flies_without_engine:
+        flown = world.fly(rows, targets, store_positions=True, engine_out=True)
+        engine_out_returns = [
+            _engine_out_return(world, target, row, track[-1], slopes)
+            for target, row, track in zip(targets, flown.results, flown.tracks, strict=True)
+        ]
     # One search for home, and one for all other sites, which finds the best of them for each start.
     site_cells = np.array([grid.cell_at(site.east, site.north) for site in sites])
     home_altitudes_left, _, home_min_altitudes = search_glides_to(site_cells[:1])
@@ -275,12 +285,16 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     site_by_cell = {
         int(np.ravel_multi_index(tuple(cell), grid.floor.shape)): k for k, cell in enumerate(site_cells) if k
     }
-    is_landable = _flat_ground(world, grid)
+    # Cells on which a landing is possible: flat, and in no exclusion zone that reaches down to `MARGIN`.
+    is_landable = landable_cells(grid)
+    exclude_zones(grid, is_landable, world.airspace.records, MARGIN)
     flat_altitudes_left, flat_cells, _ = search_glides_to(np.argwhere(is_landable))
     is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     glides = []
     for k, row in enumerate(rows):
         altitudes_left = (float(home_altitudes_left[k]), float(site_altitudes_left[k]), float(flat_altitudes_left[k]))
+        kinds: tuple[Reach, ...] = ("home", "site", "flat")
+        reached = [kind for kind, left in zip(kinds, altitudes_left, strict=True) if left >= 0.0]
         glides.append(
             Glide(
                 time=float(starts.time[k]),
@@ -291,7 +305,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
                 site=site_by_cell.get(int(reached_cells[k]), -1),
                 flat_altitude_left=altitudes_left[2],
                 flat_position=cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION,
-                reach=_best_reach(*altitudes_left) if is_known[k] else "unknown",
+                reach="unknown" if not is_known[k] else reached[0] if reached else "nothing",
             )
         )
     footprint = GlideFootprint(grid, np.minimum(home_min_altitudes, site_min_altitudes), is_landable)
@@ -317,46 +331,8 @@ def _no_glides(world: ReturnWorld) -> Glides:
     )
 
 
-def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altitude_left: float) -> Reach:
-    """Return the best kind of destination that is reached with an altitude left (m) of at least 0."""
-    if home_altitude_left >= 0.0:
-        return "home"
-    if site_altitude_left >= 0.0:
-        return "site"
-    return "flat" if flat_altitude_left >= 0.0 else "nothing"
-
-
-def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
-    """Return a mask (n, e): True for each cell on which a landing is possible.
-
-    Such a cell is flat, and lies in no exclusion zone that reaches down to `MARGIN` above the ground.
-    """
-    is_flat = landable_cells(grid)
-    exclude_zones(grid, is_flat, world.airspace.records, MARGIN)
-    return is_flat
-
-
 # ----------------------------------------------------------------------
 # The autopilot's own return.
-
-
-def _simulate_engine_out_returns(
-    world: ReturnWorld, starts: ReturnStarts, slopes: GlideSlopes
-) -> list[EngineOutReturn]:
-    """Simulate the autopilot's own return without thrust from each start.
-
-    Nothing is simulated if returns follow the terrain, or if the autopilot's return without thrust is not known: each
-    return then has the outcome "not flown".
-    """
-    targets = [world.target(row) for row in starts.rows]
-    if not world.is_simulated or not world.autopilot.returns.flies_without_engine:
-        return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
-    # A return that continues with a landing is simulated only up to its loiter.
-    flown = world.fly(starts.rows, targets, store_positions=True, engine_out=True)
-    return [
-        _engine_out_return(world, target, row, track[-1], slopes)
-        for target, row, track in zip(targets, flown.results, flown.tracks, strict=True)
-    ]
 
 
 def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
@@ -390,7 +366,17 @@ def _engine_out_return(
     if result["outcome"] == RETURN_GROUND_IMPACT:
         impact = (float(result["clearance_east"]), float(result["clearance_north"]), float(result["clearance_up"]))
     elif result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:
-        path = _glide_straight(last_position, target, slopes)
+        # A straight glide to the target, with one position about each meter.
+        offset = np.array(target.position[:2]) - last_position[:2]
+        courses = np.array(glide_steps()[0]["course"])
+        course = int(np.argmax(np.cos(courses - math.atan2(offset[0], offset[1]))))
+        table_row = round((float(last_position[2]) - slopes.first_altitude) / slopes.altitude_step)
+        # Without progress against the wind, the aircraft sinks where it is.
+        slope = float(slopes.table[course, min(max(table_row, 0), slopes.table.shape[1] - 1)])
+        distance = float(np.hypot(*offset))
+        fractions = np.linspace(0.0, 1.0, math.ceil(distance) + 1)
+        drop = min(slope, _STEEPEST_SLOPE) * distance
+        path = last_position + fractions[:, np.newaxis] * np.array([*offset, -drop])
         heights = path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])
         clearance, arrival_height = min(clearance, float(heights.min())), float(heights[-1])
         for sphere, radius in zip(world.environment.spheres, world.environment.radii, strict=True):
@@ -411,16 +397,3 @@ def _engine_out_return(
             else ("arrives" if min(clearance, arrival_height) >= MARGIN else "low")
         )
     return EngineOutReturn(target, end, arrival_height, clearance, impact, shortfall)
-
-
-def _glide_straight(position: Floats, target: ReturnTarget, slopes: GlideSlopes) -> Floats:
-    """Return a straight glide from a position, m, (3,), to a return's target: one position about each meter, (n, 3)."""
-    offset = np.array(target.position[:2]) - position[:2]
-    courses = np.array(glide_steps()[0]["course"])
-    course = int(np.argmax(np.cos(courses - math.atan2(offset[0], offset[1]))))
-    row = round((float(position[2]) - slopes.first_altitude) / slopes.altitude_step)
-    # Without progress against the wind, the aircraft sinks where it is.
-    slope = min(float(slopes.table[course, min(max(row, 0), slopes.table.shape[1] - 1)]), _STEEPEST_SLOPE)
-    distance = float(np.hypot(*offset))
-    fractions = np.linspace(0.0, 1.0, math.ceil(distance) + 1)
-    return np.asarray(position + fractions[:, np.newaxis] * np.array([*offset, -slope * distance]))

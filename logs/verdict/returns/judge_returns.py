@@ -588,26 +588,18 @@ def judge_returns(
         ]
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
         returns += reported_returns
-    return replace(
-        _no_returns(world, starts, interval),
-        each=tuple(returns),
-        jsbsim_differences=tuple(differences),
-        omitted_count=omitted_count,
-    )
-
-
-def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Returns:
-    """Return a `Returns` without any return, but with the data on autopilot, zones and reserve."""
     parameters = world.autopilot.parameters
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
-        each=(),
+        each=tuple(returns),
         interval=interval,
         causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
         reserve=ENERGY_RESERVE_FRACTION * world.setup.battery,
         flown=starts.is_flown,
+        jsbsim_differences=tuple(differences),
+        omitted_count=omitted_count,
         stands_in=world.stands_in,
         unjudged_parts=world.unjudged_parts,
         autoland=None if world.uses_other_autopilot else autoland,

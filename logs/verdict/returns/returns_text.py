@@ -186,38 +186,27 @@ def headline(returns: Returns) -> str:
         f"; at {count_text(low_count, 'start')} the flight itself is below the required height" if low_count else ""
     )
     incomplete_text = f"not judged in full ({reasons}): " if reasons else ""
-    return f"{incomplete_text}{_judged_text(returns)}{low_text}{omitted_text}{landing_suffix}"
-
-
-def _judged_text(returns: Returns) -> str:
-    """Return a text on the outcomes of the judged returns.
-
-    If all are safe, the text states their minimum height above ground and the minimum energy left.
-    """
     total, failure_counts = len(returns.each), counts_text(returns)
-    if failure_counts:
-        safe_count = returns.count("safe")
-        common_kind = next((kind for kind in KINDS if returns.count(kind) == total), None)
-        if common_kind is not None:
-            subject, texts = (
-                (f"all {total} returns", _PLURAL_TEXTS) if total > 1 else ("the only return", _SINGULAR_TEXTS)
-            )
-            return f"{subject} {texts[common_kind].format(limit=returns.limit)}"
-        first_count, _, outcomes = failure_counts.partition(" ")
+    common_kind = next((kind for kind in KINDS if returns.count(kind) == total), None)
+    subject, verb, texts = (
+        (f"all {total} returns", "are", _PLURAL_TEXTS) if total > 1 else ("the only return", "is", _SINGULAR_TEXTS)
+    )
+    if failure_counts and common_kind is not None:
+        judged_text = f"{subject} {texts[common_kind].format(limit=returns.limit)}"
+    elif failure_counts:
+        safe_count, (first_count, _, outcomes) = returns.count("safe"), failure_counts.partition(" ")
         safe_text = "none is" if safe_count == 0 else "1 is" if safe_count == 1 else f"{safe_count} are"
-        return f"{first_count} of {total} returns {outcomes}; {safe_text} safe"
-    # Returns that begin below the limit, as after a take-off, are left out: their lowest point is the start.
-    high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
-    lowest_return = min(high_returns, key=lambda ret: ret.clearance)
-    min_energy_left = min(
-        (ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)), default=math.nan
-    )
-    energy_text = (
-        "" if math.isnan(min_energy_left) else f", and at least {quantity_text(min_energy_left, 'Wh')} are left"
-    )
-    landing_suffix = " up to their landing" if returns.lands else ""
-    subject = f"all {total} returns are" if total > 1 else "the only return is"
-    return f"{subject} safe{landing_suffix}: never lower than {lowest_return.clearance:.0f} m above ground{energy_text}"
+        judged_text = f"{first_count} of {total} returns {outcomes}; {safe_text} safe"
+    else:
+        # Returns that begin below the limit, as after a take-off, are left out: their lowest point is the start.
+        high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
+        lowest_return = min(high_returns, key=lambda ret: ret.clearance)
+        energies_left = [ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)]
+        energy_text = f", and at least {quantity_text(min(energies_left), 'Wh')} are left" if energies_left else ""
+        end_text = " up to their landing" if returns.lands else ""
+        height_text = f"never lower than {lowest_return.clearance:.0f} m above ground"
+        judged_text = f"{subject} {verb} safe{end_text}: {height_text}{energy_text}"
+    return f"{incomplete_text}{judged_text}{low_text}{omitted_text}{landing_suffix}"
 
 
 def point_of_no_return_text(returns: Returns) -> str:

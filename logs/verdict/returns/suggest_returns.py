@@ -6,6 +6,7 @@ the nearest point and not to the best, so a set is rated by the autopilot's choi
 away from a better point.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -405,10 +406,11 @@ def _rally_candidates(
             highest_ground = float(np.max(heights))
         min_altitude = highest_ground + world.limit + MARGIN
         for altitude in (min_altitude, min_altitude + 200.0):
-            if (
-                math.isfinite(altitude)
-                and _sphere_clearance(world, (grid_east, grid_north, altitude)) > _LOITER_RADIUS_M + MARGIN
-            ):
+            # Distance outside the nearest kill sphere.
+            spheres, sphere_radii = world.environment.spheres, world.environment.radii
+            distances = np.linalg.norm(spheres - np.array([grid_east, grid_north, altitude]), axis=1) - sphere_radii
+            sphere_distance = float(np.min(distances[sphere_radii > 0.0], initial=math.inf))
+            if math.isfinite(altitude) and sphere_distance > _LOITER_RADIUS_M + MARGIN:
                 point_altitude = altitude
                 if end_height > 0.0:
                     terrain = world.scenario.terrain
@@ -419,12 +421,6 @@ def _rally_candidates(
                 height = math.ceil(point_altitude - world.home.up)
                 candidates.append(ReturnPoint(grid_east, grid_north, world.home.up + height, world.home.up))
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
-
-
-def _sphere_clearance(world: ReturnWorld, position: tuple[float, float, float]) -> float:
-    """Return a position's distance outside the nearest kill sphere, m."""
-    distances = np.linalg.norm(world.environment.spheres - np.array(position), axis=1) - world.environment.radii
-    return float(np.min(distances[world.environment.radii > 0.0], initial=math.inf))
 
 
 class _RallySearch:
@@ -473,29 +469,34 @@ class _RallySearch:
         point_set: initial set, as indices of candidates.
         """
         self._simulate_candidates(searched_starts[~self._is_simulated[searched_starts]])
+        candidates = range(len(self.candidates))
         while len(point_set) < _MAX_POINTS and self._count_good(searched_starts, point_set) < len(searched_starts):
-            extended_set = self._with_best_addition(searched_starts, point_set)
+            # Add the best point, or the best pair if no single point is an improvement.
+            counts = [self._count_good(searched_starts, [*point_set, candidate]) for candidate in candidates]
+            extended_set = [*point_set, int(np.argmax(counts))]
+            if max(counts) <= self._count_good(searched_starts, point_set):
+                best_single_points = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEED_COUNT].tolist()
+                extended_set = max(
+                    ([*point_set, point, candidate] for point in best_single_points for candidate in candidates),
+                    key=lambda pair_set: self._count_good(searched_starts, pair_set),
+                )
             if self._count_good(searched_starts, extended_set) <= self._count_good(searched_starts, point_set):
                 break
-            point_set = self._with_swaps(searched_starts, extended_set)
+            # Swap points for other candidates until no swap increases the number of good returns.
+            point_set, has_improved = extended_set, True
+            while has_improved:
+                best_count, has_improved = self._count_good(searched_starts, point_set), False
+                for position, candidate in itertools.product(range(len(point_set)), candidates):
+                    swapped_set = [*point_set[:position], candidate, *point_set[position + 1 :]]
+                    count = self._count_good(searched_starts, swapped_set)
+                    if count > best_count:
+                        best_count, point_set, has_improved = count, swapped_set, True
         # Remove the points that do not increase the number of good returns.
         for candidate in list(point_set):
             smaller_set = [other for other in point_set if other != candidate]
             if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):
                 point_set = smaller_set
         return point_set
-
-    def _with_best_addition(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Return a set extended by the best point, or by the best pair if no single point is an improvement."""
-        candidates = range(len(self.candidates))
-        counts = [self._count_good(searched_starts, [*point_set, candidate]) for candidate in candidates]
-        if max(counts) > self._count_good(searched_starts, point_set):
-            return [*point_set, int(np.argmax(counts))]
-        best_single_points = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEED_COUNT].tolist()
-        return max(
-            ([*point_set, point, candidate] for point in best_single_points for candidate in candidates),
-            key=lambda extended_set: self._count_good(searched_starts, extended_set),
-        )
 
     def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
         """Simulate the returns from starts to their nearest candidates.
@@ -544,16 +545,3 @@ class _RallySearch:
             self._is_good[searched_starts, np.array(point_set)[nearest_indices]],
         )
         return int(is_good.sum())
-
-    def _with_swaps(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Swap points of a set for other candidates until no swap increases the number of good returns."""
-        best_count, has_improved = self._count_good(searched_starts, point_set), True
-        while has_improved:
-            has_improved = False
-            for position in range(len(point_set)):
-                for candidate in range(len(self.candidates)):
-                    swapped_set = [*point_set[:position], candidate, *point_set[position + 1 :]]
-                    count = self._count_good(searched_starts, swapped_set)
-                    if count > best_count:
-                        best_count, point_set, has_improved = count, swapped_set, True
-        return point_set

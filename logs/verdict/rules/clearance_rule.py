@@ -88,27 +88,33 @@ def clearance_findings(
         segments = np.flatnonzero(legs == leg)
         planned_height, required_height = requirement.worst_height(heights[segments], points[segments])
         if geometric:
-            off_text = _off_terrain_text(requirements, terrain, off_terrain[segments])
+            # The first place where the leg leaves the terrain data.
+            places, off_text = off_terrain[segments], ""
+            is_off = np.isfinite(places[:, 0])
+            if is_off.any():
+                east, north = places[int(np.argmax(is_off)), :2].tolist()
+                place_text = f"east {east:.0f} m, north {north:.0f} m{_geographic_text(requirements, east, north)}"
+                off_text = f"leaves the data of {terrain.source} at {place_text}"
             findings.append(_planned_finding(requirements, leg, planned_height, required_height, terrain, off_text))
         else:
             is_short = planned_height < required_height - CLEARANCE_TOLERANCE_M
             findings.append(
                 _flown_finding(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
             )
-    return [*_home_above_ground_findings(requirements, findings), *findings]
-
-
-def _off_terrain_text(requirements: RouteRequirements, terrain: Terrain, places: Floats) -> str:
-    """Return a clause on the first place where a leg leaves the terrain data; "" if it does not.
-
-    places: for each segment of the leg, the first place over unknown ground, m, (n, 3); NaN if there is none.
-    """
-    is_off = np.isfinite(places[:, 0])
-    if not is_off.any():
-        return ""
-    east, north = places[int(np.argmax(is_off)), :2].tolist()
-    place_text = f"east {east:.0f} m, north {north:.0f} m{_geographic_text(requirements, east, north)}"
-    return f"leaves the data of {terrain.source} at {place_text}"
+    # When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
+    # by the height of the mission's home above the ground; it is NaN if it is unknown.
+    height = home_height(requirements.setup)
+    if height > HOME_ERROR_M and any(
+        finding.margin is not None and 0.0 <= finding.margin < height for finding in findings
+    ):
+        fault = message(
+            f"the mission's home is {height:.0f} m above the ground there",
+            f"; if the aircraft is armed on that ground, the whole flight is {height:.0f} m lower. Its lowest point is"
+            f" then {lowest_clearance(findings) - height:.0f} m above ground",
+        )
+        home_finding = make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)
+        findings.insert(0, home_finding)
+    return findings
 
 
 def _geographic_text(requirements: RouteRequirements, east: float, north: float) -> str:
@@ -135,31 +141,6 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
         brief, "; no terrain data confirms that the ground there is so low. Name an elevation file with --terrain"
     )
     return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
-
-
-def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: list[Finding]) -> list[Finding]:
-    """Return an undecided finding if home is above ground, and a leg would be too low with home on it.
-
-    When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
-    by the height of the mission's home above the ground.  Return [] if no leg would be too low, or if the height of
-    home is unknown.
-
-    leg_findings: findings on the legs with the mission's own home.
-    """
-    height = home_height(requirements.setup)
-    # The height is NaN if it is unknown; then nothing is reported.
-    if not height > HOME_ERROR_M or not any(
-        finding.margin is not None and 0.0 <= finding.margin < height for finding in leg_findings
-    ):
-        return []
-    min_height = lowest_clearance(leg_findings) - height
-    brief = f"the mission's home is {height:.0f} m above the ground there"
-    explanation = (
-        f"; if the aircraft is armed on that ground, the whole flight is {height:.0f} m lower. Its lowest point is then"
-        f" {min_height:.0f} m above ground"
-    )
-    fault = message(brief, explanation)
-    return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
 
 
 class _Requirement(NamedTuple):
@@ -280,23 +261,6 @@ def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float]
     return float(east), float(north)
 
 
-def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> int:
-    """Return the segment of the track from which the clearance of a leg is judged.
-
-    It is normally the first segment of the leg.  In an imported log with a take-off, it is the first segment at or
-    above `GROUND_LEG_CLEARANCE_M`, if the aircraft stays near home until then.
-    """
-    first, last = aligned.leg_segments(leg)
-    home = _logged_takeoff_home(requirements)
-    if home is None or leg > takeoff_item(requirements.setup)[0]:
-        return first
-    is_airborne = aligned.clearance[first:last] >= GROUND_LEG_CLEARANCE_M
-    climb_rows = int(np.argmax(is_airborne)) if is_airborne.any() else 0
-    places = aligned.track.position[first : first + climb_rows, :2]
-    is_near_home = np.hypot(places[:, 0] - home[0], places[:, 1] - home[1]) <= FIELD_RADIUS_M
-    return first + climb_rows if is_near_home.all() else first
-
-
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
     """Name the source of a required height above ground, m; near home and landing point it is lower."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
@@ -369,7 +333,15 @@ def _flown_finding(
     terrain, off_text, facts = requirements.setup.scenario.terrain, "", list[Fact]()
     first, last = (0, 0) if aligned is None else aligned.leg_segments(leg)
     if aligned is not None and last > first:
-        first = _first_airborne_segment(requirements, aligned, leg)
+        home = _logged_takeoff_home(requirements)
+        if home is not None and leg <= takeoff_item(requirements.setup)[0]:
+            # In an imported log with a take-off, the leg is judged from where it reaches `GROUND_LEG_CLEARANCE_M`, if
+            # the aircraft stays near home until then.
+            is_airborne = aligned.clearance[first:last] >= GROUND_LEG_CLEARANCE_M
+            climb_rows = int(np.argmax(is_airborne)) if is_airborne.any() else 0
+            places = aligned.track.position[first : first + climb_rows, :2]
+            is_near_home = np.hypot(places[:, 0] - home[0], places[:, 1] - home[1]) <= FIELD_RADIUS_M
+            first += climb_rows if is_near_home.all() else 0
         clearances = aligned.clearance[first:last]
         is_known = np.isfinite(clearances)
         if is_known.any():

@@ -22,7 +22,6 @@ from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M, SAME_POSITION_DIST
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
-    Profile,
     first_hazard_on_path,
     has_ground_paths,
     landing_item,
@@ -131,8 +130,16 @@ def climbout_findings(
     if takeoff is not None:
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
-        launch = _find_launch(requirements)
-        course = launch.course
+        # The launch is on the scenario's course, or along the first leg if the scenario states no course.
+        stated_launch = requirements.setup.scenario.launch
+        course, slope = float(requirements.courses[0]), math.tan(float(requirements.slopes[0]))
+        launch = _Launch(course, float(requirements.runs[0]), slope)
+        if stated_launch is not None and stated_launch.course is not None:
+            course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
+            launch = launch._replace(course_text=course_text)
+            if abs(float(wrap(stated_launch.course - course))) > PLAN_TOLERANCE_RAD:
+                course = stated_launch.course
+                launch = _Launch(course, leg_length=math.inf, slope=0.0, course_text=course_text)
     else:
         course = math.atan2(first_point[0] - start[0], first_point[1] - start[1])
         distance = math.dist(first_point[:2], start)
@@ -147,7 +154,13 @@ def climbout_findings(
         reason = "the aircraft cannot climb there at this speed and in this wind"
         return [_unjudged_finding("climbout", place, reason, is_undecided=takeoff is not None)]
     if takeoff is None:
-        path = straight_path(start, course, _climb_profile(ground_altitude, float(first_point[2]), distance, max_slope))
+        # A climb from the ground, then a straight line to the first waypoint.
+        top_altitude = max(float(first_point[2]), ground_altitude + FIRST_CLIMB_HEIGHT_M)
+        climb_distance = (top_altitude - ground_altitude) / max_slope
+        profile = [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, float(first_point[2]))]
+        if climb_distance >= distance:
+            profile = [(0.0, ground_altitude), (distance, ground_altitude + max_slope * distance)]
+        path = straight_path(start, course, profile)
         return [_air_start_finding(place, _find_obstacles(requirements, path))]
     takeoff_altitude = float(requirements.points[0, 2])
     if takeoff_altitude <= ground_altitude:
@@ -200,20 +213,6 @@ class _Launch(NamedTuple):
     course_text: str = ""
 
 
-def _find_launch(requirements: RouteRequirements) -> _Launch:
-    """Return the launch on the scenario's course, or along the first leg if the scenario states no course."""
-    stated_launch = requirements.setup.scenario.launch
-    first_leg = _Launch(
-        float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
-    )
-    if stated_launch is None or stated_launch.course is None:
-        return first_leg
-    course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
-    if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
-        return first_leg._replace(course_text=course_text)
-    return _Launch(stated_launch.course, leg_length=math.inf, slope=0.0, course_text=course_text)
-
-
 class _Climb(NamedTuple):
     """Straight climb of a take-off from home.
 
@@ -249,23 +248,6 @@ def _take_off_climb(
     profile = [(0.0, ground), (climb_distance, ground + slope * climb_distance)]
     obstacles = _find_obstacles(requirements, straight_path(start, launch.course, profile))
     return _Climb(slope, profile[-1][0], obstacles)
-
-
-def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: float, climb_slope: float) -> Profile:
-    """Return the profile of a climb from the ground, followed by a straight line to the first waypoint.
-
-    The profile is a list of pairs: horizontal distance from home (m) and altitude (m AMSL).
-
-    ground_altitude: altitude of the ground, m AMSL.
-    waypoint_altitude: altitude of the waypoint, m AMSL.
-    distance: horizontal distance of the waypoint, m.
-    climb_slope: m per m.
-    """
-    top_altitude = max(waypoint_altitude, ground_altitude + FIRST_CLIMB_HEIGHT_M)
-    climb_distance = (top_altitude - ground_altitude) / climb_slope
-    if climb_distance >= distance:
-        return [(0.0, ground_altitude), (distance, ground_altitude + climb_slope * distance)]
-    return [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, waypoint_altitude)]
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
@@ -337,7 +319,14 @@ def _launch_finding(
     if not min_obstacles.is_clear:
         fault = min_obstacles.obstacle_message(subject, "from home")
         climb_text = _climb_text(gentlest, launch, item_text, end_height)
-        limit_text = "" if is_certain else _certain_climb_text(steepest.slope, certain_slope)
+        limit_text = (
+            ""
+            if is_certain
+            else (
+                f". The steepest climb is {_degrees_text(steepest.slope)}, but only"
+                f" {_degrees_text(max(0.0, certain_slope))} is certain for this aircraft"
+            )
+        )
         fault = replace(fault, text=f"{fault.text}. {climb_text}{limit_text}")
         return _path_finding("climbout", place, obstacles, ok=None, outcome=fault, check=GROUND_PATH)
     return _path_finding(
@@ -363,12 +352,6 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
             f" is only {launch.leg_length:.0f} m from home"
         )
     return text
-
-
-def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
-    """Return a clause that compares the nominal and the certain maximum climb slope, m per m."""
-    certain_text = _degrees_text(max(0.0, certain_slope))
-    return f". The steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
 
 def _degrees_text(slope: float) -> str:

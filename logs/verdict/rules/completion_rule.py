@@ -6,7 +6,7 @@ import numpy as np
 
 from flight.mission.items import Command
 from flight.simulation.setup import FlightSetup, MissingItems
-from logs.verdict.findings import Finding, Message, finding_reason, make_finding, message
+from logs.verdict.findings import Finding, finding_reason, make_finding, message
 from logs.verdict.imported.flown_legs import FlownLegs, gaps_between, stretch_end_text
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -41,8 +41,28 @@ def completion_findings(
         # A leg counts as flown only once its loiter is complete.
         flown_count = leg_count - len(set(leg_numbers[~aligned.passed[1:]].tolist()))
         if flown_count < leg_count:
-            faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown"))
-        faults += _record_faults(aligned)
+            first_unflown = place_text(requirements.leg(int(np.argmin(aligned.passed[1:]))))
+            unflown_text = f"; the first leg that was not flown to its end is {first_unflown}"
+            faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown", unflown_text))
+        # A long gap between the log's rows, and positions that contradict the velocities, are faults, too.
+        track = aligned.track
+        steps = np.diff(track.time)
+        gap = int(np.argmax(steps))
+        if steps[gap] > max(MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS * float(np.median(steps))):
+            faults.append(message(f"the log has no rows from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
+        # Across missing rows the mean velocity is meaningless.
+        is_short = steps <= MAX_ROW_GAP_S
+        squares = np.zeros(int(is_short.sum()))
+        for axis in range(3):
+            mean_velocity = np.diff(track.position[:, axis])[is_short] / steps[is_short]
+            recorded_velocity = track.velocity[:, axis].astype(np.float64)
+            squares += (mean_velocity - 0.5 * (recorded_velocity[1:] + recorded_velocity[:-1])[is_short]) ** 2
+        differences = np.sqrt(squares)
+        if differences.size and differences.max() > MAX_VELOCITY_DISAGREEMENT_MPS:
+            k = int(np.argmax(differences))
+            faults.append(
+                message(f"position and velocity contradict each other at {track.time[:-1][is_short][k]:.2f} s")
+            )
     success_text = f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
     reason = finding_reason(faults) if faults else success_text
     return [
@@ -63,27 +83,6 @@ def completion_findings(
             method="waypoints passed in order",
         )
     ]
-
-
-def _record_faults(aligned: AlignedTrack) -> list[Message]:
-    """Report as faults a long gap between the log's rows, and positions that contradict the velocities."""
-    track, faults = aligned.track, []
-    steps = np.diff(track.time)
-    gap = int(np.argmax(steps))
-    if steps[gap] > max(MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS * float(np.median(steps))):
-        faults.append(message(f"the log has no rows from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
-    # Across missing rows the mean velocity is meaningless.
-    is_short = steps <= MAX_ROW_GAP_S
-    squares = np.zeros(int(is_short.sum()))
-    for axis in range(3):
-        mean_velocity = np.diff(track.position[:, axis])[is_short] / steps[is_short]
-        recorded_velocity = track.velocity[:, axis].astype(np.float64)
-        squares += (mean_velocity - 0.5 * (recorded_velocity[1:] + recorded_velocity[:-1])[is_short]) ** 2
-    differences = np.sqrt(squares)
-    if differences.size and differences.max() > MAX_VELOCITY_DISAGREEMENT_MPS:
-        k = int(np.argmax(differences))
-        faults.append(message(f"position and velocity contradict each other at {track.time[:-1][is_short][k]:.2f} s"))
-    return faults
 
 
 # Name of the mode that flies a return to launch.
@@ -127,8 +126,14 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
     else:
         last_stretch = stretches[-1]
         legs_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown"
-        ending = f"{stretch_end_text(last_stretch.stretch)}, on the way to {_next_waypoint_text(setup, last_stretch)}"
-        if _ends_in_return(setup, last_stretch):
+        # The waypoint to which the aircraft was flying when the last part of the log ended.
+        waypoint = min(setup.route.legs, last_stretch.last if last_stretch.partial else last_stretch.last + 1)
+        item = int(setup.route.items[waypoint])
+        waypoint_text = f"waypoint {setup.route.stops[waypoint]}" + (f" (item {item})" if item >= 0 else "")
+        ending = f"{stretch_end_text(last_stretch.stretch)}, on the way to {waypoint_text}"
+        commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
+        is_return_next = commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
+        if is_return_next and last_stretch.stretch.next_mode == _RETURN_MODE:
             notes.append(f"{legs_text}, and the return at the mission's end began at {last_stretch.stretch.end:.1f} s")
         elif last_stretch.stretch.ended == "log":
             unknown_texts.append(f"{ending}; {legs_text}")
@@ -212,25 +217,6 @@ def _missing_items_text(missing: MissingItems) -> str:
     """State the number of mission items that are not in the log."""
     count = len(missing.numbers)
     return f"{count} {'item of the mission is' if count == 1 else 'items of the mission are'} not in the log"
-
-
-def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Return True if mode RTL follows a part of the log, and its next mission item is a return to launch."""
-    item = int(setup.route.items[_next_waypoint(setup, legs)])
-    commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
-    return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
-
-
-def _next_waypoint(setup: FlightSetup, legs: FlownLegs) -> int:
-    """Return the waypoint to which the aircraft was flying when a part of the log ended."""
-    return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
-
-
-def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
-    """Name the waypoint to which the aircraft was flying when a part of the log ended."""
-    waypoint = _next_waypoint(setup, legs)
-    item = int(setup.route.items[waypoint])
-    return f"waypoint {setup.route.stops[waypoint]}" + (f" (item {item})" if item >= 0 else "")
 
 
 RULE = Rule(

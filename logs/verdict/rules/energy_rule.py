@@ -1,12 +1,12 @@
 """The energy rule: compare the energy from battery or tank, predicted and flown, with the usable energy."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from flight.autopilots.parts import BatteryFailsafe
 from flight.mission.items import Command
 from flight.mission.route import make_route
 from logs.verdict.findings import (
@@ -60,7 +60,12 @@ def energy_findings(
     limit, source, failsafe_text = _energy_limit(requirements)
     planned_energy, peak_current = predicted_energy(requirements)
     is_guessed = envelope.battery_guessed and setup.scenario.flight.battery_wh is None
-    energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
+    energy, max_current = (planned_energy, peak_current) if geometric else (math.nan, math.nan)
+    # A flight with take-off or landing has one track for all of it.
+    phases, track = requirements.ground_phases, None if aligned is None else aligned.track
+    track = track if phases is None else phases.track
+    if track is not None and not geometric:
+        energy, max_current = float(track.energy.max()), float(track.current.max())
     is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
     is_measured = setup.imported_log is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
@@ -86,7 +91,9 @@ def energy_findings(
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:
             reason += f"; a reserve of {ENERGY_RESERVE_FRACTION:.0%} must be left"
-        reason += "" if is_guessed or max_energy <= needed_energy else _max_energy_text(max_energy, envelope.source)
+        if not is_guessed and max_energy > needed_energy:
+            reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is uncertain"
+            reason += f" (from {envelope.source})"
         reason += failsafes.unjudged_text if failsafes.faults else f"{failsafe_text}{failsafes.unjudged_text}"
     undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []
     is_undecided = is_guessed or is_uncertain or bool(undecided_faults) or math.isnan(energy)
@@ -136,14 +143,6 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     return energy, "autopilot", clause
 
 
-def _max_energy_text(max_energy: float, source: str) -> str:
-    """Return a clause on the upper limit of the energy that the flight may need, Wh.
-
-    source: source of the aircraft's power data.
-    """
-    return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is uncertain (from {source})"
-
-
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
     """Report an endless jump as a fault, with the rounds that the energy permits; [] without one.
 
@@ -151,7 +150,7 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     usable_energy: energy without the reserve, Wh.
     energy_ratio: ratio of the flown energy to the predicted energy; 1 if it is unknown.
     """
-    route = requirements.setup.route
+    setup, route = requirements.setup, requirements.setup.route
     if route.endless_jump is None:
         return []
     last_waypoint = len(route.items) - 1
@@ -167,7 +166,22 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     if not round_energy > 0.0:
         return [message(fault)]
     # Energy of the mission flown once through: path to the first round, that round, and the items after the jump.
-    first_energy = _energy_without_jump(requirements)
+    first_energy = math.nan
+    items = tuple(
+        replace(item, params=(item.params[0], 0.0, *item.params[2:]))
+        if item.seq == route.endless_jump and item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG)
+        else item
+        for item in setup.mission.items
+    )
+    if items != setup.mission.items:
+        mission, scenario = replace(setup.mission, items=items), setup.scenario
+        with suppress(PlanflyError):
+            single_route = make_route(
+                *(mission, scenario.origin, scenario.terrain, setup.airspeed, scenario.flight.fly_over, setup.limits),
+                setup.autopilot.route_rules,
+            )
+            single_setup = replace(setup, mission=mission, route=single_route)
+            first_energy = predicted_energy(route_requirements(single_setup))[0]
     if not math.isfinite(first_energy):
         first_energy = sum(energies[:start])
     repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
@@ -176,38 +190,6 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     rounds_text = count_text(repeats + 1, "round")
     fault = f"{fault}. Each round uses {round_energy:.1f} of {usable_energy:.0f} usable Wh, enough for {rounds_text}"
     return [message(f"{fault}. Set its repeat count to {repeats}")]
-
-
-def _energy_without_jump(requirements: RouteRequirements) -> float:
-    """Predict the energy of the mission without its endless jump, Wh; NaN if its route is not known."""
-    setup = requirements.setup
-    items = tuple(
-        replace(item, params=(item.params[0], 0.0, *item.params[2:]))
-        if item.seq == setup.route.endless_jump and item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG)
-        else item
-        for item in setup.mission.items
-    )
-    if items == setup.mission.items:
-        return math.nan
-    mission, scenario = replace(setup.mission, items=items), setup.scenario
-    try:
-        route = make_route(
-            *(mission, scenario.origin, scenario.terrain, setup.airspeed, scenario.flight.fly_over, setup.limits),
-            setup.autopilot.route_rules,
-        )
-        return predicted_energy(route_requirements(replace(setup, mission=mission, route=route)))[0]
-    except PlanflyError:
-        return math.nan
-
-
-def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:
-    """Return the energy (Wh) and peak current (A) of a flight from take-off to landing; NaN if not flown."""
-    track = None if aligned is None else aligned.track
-    if requirements.ground_phases is not None:
-        track = requirements.ground_phases.track
-    if track is None:
-        return math.nan, math.nan
-    return float(track.energy.max()), float(track.current.max())
 
 
 class _FailsafeMessages(NamedTuple):
@@ -233,10 +215,23 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
     if setup.imported_log is not None or math.isnan(energy_used):
         return messages
     charge_used = energy_used / volts * _MAH_PER_AH if volts else math.nan
+    # The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
+    # `EMPTY_CELL_VOLTAGE_V` in each cell.
+    cells = 0 if setup.envelope.battery_guessed else round(volts / NOMINAL_CELL_VOLTAGE_V)
     for failsafe in setup.autopilot.checks.battery_failsafes:
         name = f"{failsafe.parameter} {failsafe.threshold:g}"
         if math.isnan(failsafe.used_charge):
-            if voltage_text := _reachable_voltage_text(requirements, failsafe, energy_used):
+            voltage_text, cell_voltage = "", failsafe.threshold / cells if cells else 0.0
+            if math.isfinite(failsafe.remaining_fraction):
+                remaining_fraction = 1.0 - energy_used / setup.battery
+                if remaining_fraction < failsafe.remaining_fraction:
+                    voltage_text = f"{remaining_fraction:.0%} of the battery is left"
+            elif cell_voltage > EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
+                voltage_text = (
+                    f"{cell_voltage:.2f} V in each of {cells} cells ({volts:g} V), more than the"
+                    f" {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell; the voltage is not simulated"
+                )
+            if voltage_text:
                 messages.undecided.append(message(f"the failsafe {name} may end the mission", f": {voltage_text}"))
             else:
                 unjudged.append(name)
@@ -247,57 +242,25 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
                 messages.undecided.append(message(f"{limit_text}{share_text}"))
             else:
                 messages.faults.append(message(f"{limit_text}, but the flight needs {charge_used:.0f} mAh"))
-    if return_time_fault := _return_time_fault(requirements, energy_used):
-        messages.undecided.append(return_time_fault)
-    clause = f"; the voltage is not simulated, so it is not judged whether {' or '.join(unjudged)} ends the mission"
-    return messages._replace(unjudged_text=clause if unjudged else "")
-
-
-def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> Message | None:
-    """Return a message if the battery's remaining time may trigger an early return, otherwise None.
-
-    The remaining time is shortest at the end of the mission.  It is compared with the time of the longest return, so
-    that the result holds at all times of the mission.
-    """
-    failsafe = requirements.setup.autopilot.checks.return_time_failsafe
-    if failsafe is None:
-        return None
-    factor = math.exp(UNDECIDED_FRACTION * requirements.setup.envelope.power_sd)
-    remaining = remaining_time(requirements, failsafe, factor * energy_used, factor)
-    return_time = longest_return_time(requirements, failsafe)
-    needed = failsafe.time_factor * return_time + failsafe.time_margin
-    if remaining > needed:
-        return None
-    if math.isnan(remaining) or math.isinf(return_time):
-        reason = "the time left in the battery, or the duration of a return, is unknown"
-    else:
+    return_failsafe = setup.autopilot.checks.return_time_failsafe
+    if return_failsafe is not None:
+        # The battery's remaining time may trigger an early return.  It is shortest at the end of the mission, and is
+        # compared with the time of the longest return, so that the result holds at all times of the mission.
+        factor = math.exp(UNDECIDED_FRACTION * setup.envelope.power_sd)
+        remaining = remaining_time(requirements, return_failsafe, factor * energy_used, factor)
+        return_time = longest_return_time(requirements, return_failsafe)
+        needed = return_failsafe.time_factor * return_time + return_failsafe.time_margin
         reason = (
             f"at the mission's end PX4 estimates {max(0.0, remaining) / 60.0:.1f} min of battery, but requires"
             f" {needed / 60.0:.1f} min for a return of up to {return_time / 60.0:.1f} min"
         )
-    brief = f"the failsafe {failsafe.parameter} may start a return before the mission ends"
-    return message(brief, f": {reason}; {failsafe.remedy}")
-
-
-def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a voltage failsafe may act before the battery is at its reserve; otherwise "".
-
-    The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
-    `EMPTY_CELL_VOLTAGE_V` in each cell.  The number of cells is calculated with `NOMINAL_CELL_VOLTAGE_V`.
-    """
-    setup = requirements.setup
-    if math.isfinite(failsafe.remaining_fraction):
-        remaining_fraction = 1.0 - energy_used / setup.battery
-        return (
-            f"{remaining_fraction:.0%} of the battery is left"
-            if remaining_fraction < failsafe.remaining_fraction
-            else ""
-        )
-    cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
-    if not cells or failsafe.threshold / cells <= EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
-        return ""
-    cell_text = f"{failsafe.threshold / cells:.2f} V in each of {cells} cells ({setup.envelope.volts:g} V)"
-    return f"{cell_text}, more than the {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell; the voltage is not simulated"
+        if math.isnan(remaining) or math.isinf(return_time):
+            reason = "the time left in the battery, or the duration of a return, is unknown"
+        if not remaining > needed:
+            brief = f"the failsafe {return_failsafe.parameter} may start a return before the mission ends"
+            messages.undecided.append(message(brief, f": {reason}; {return_failsafe.remedy}"))
+    clause = f"; the voltage is not simulated, so it is not judged whether {' or '.join(unjudged)} ends the mission"
+    return messages._replace(unjudged_text=clause if unjudged else "")
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:

@@ -65,7 +65,16 @@ def fence_findings(
         return [*findings, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
     terrain = requirements.setup.scenario.terrain
     if geometric and requirements.zone_check_legs is not None:
-        return findings + _findings_on_legs(requirements, *requirements.zone_check_legs)
+        # Only the zones that the planned path touches on these legs, both included.
+        first, last = requirements.zone_check_legs
+        start, end = np.searchsorted(requirements.path.legs, [first, last + 1]).tolist()
+        numbers = airspace.zones_near(requirements.path.points[start : end + 1])
+        records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
+        visits_on_legs = path_zones(planned_moves(requirements, first, last), records, terrain)
+        touched = np.flatnonzero((visits_on_legs["depth"] > 0.0) | visits_on_legs["unknown"]).tolist()
+        return findings + [
+            _zone_finding(requirements, int(numbers[k]), visits_on_legs[k], flown_visit=None) for k in touched
+        ]
     planned_visits = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown_visits = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
     visits = [planned_visits] if flown_visits is None else [planned_visits, flown_visits]
@@ -83,19 +92,6 @@ def fence_findings(
         moves = planned_moves(requirements) if aligned is None else flown_moves(aligned)
         zone_findings.insert(0, _compliance_finding(requirements, planned_visits, flown_visits, moves))
     return findings + zone_findings
-
-
-def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
-    """Judge the zones that the planned path touches on legs `first` to `last`, both included."""
-    airspace, path = requirements.airspace, requirements.path
-    start, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
-    numbers = airspace.zones_near(path.points[start : end + 1])
-    records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
-    planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
-    touched_indices = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
-    return [
-        _zone_finding(requirements, int(numbers[k]), planned[k], flown_visit=None) for k in touched_indices.tolist()
-    ]
 
 
 def _compliance_finding(
@@ -125,7 +121,15 @@ def _compliance_finding(
             reason += f", within the corridor of {corridor:.0f} m about the legs"
         navigation_error = position_error(requirements.setup)
         if margin < navigation_error:
-            near_zones = _near_zones(requirements, visits, moves, navigation_error)
+            # Distances of all zones that are so near.  In `visits`, the depth of a zone that is not the nearest may be
+            # larger than its real one.
+            records, distances = airspace.records, {}
+            for zone in np.flatnonzero(visits["depth"] > -navigation_error).tolist():
+                zone_record = ZoneRecords(records.zones[zone : zone + 1], records.edges)
+                visit = path_zones(moves, zone_record, requirements.setup.scenario.terrain)[0]
+                if not visit.unknown and -visit.depth < navigation_error:
+                    distances[zone] = -float(visit.depth)
+            near_zones = dict(sorted(distances.items(), key=lambda near: near[1]))
             facts.append(Fact("navigation error", navigation_error, "m"))
             facts += [Fact(f"distance to zone {zone}", distance, "m") for zone, distance in near_zones.items()]
             reason += f"; that is less than the navigation error of {navigation_error:.1f} m"
@@ -153,22 +157,6 @@ def _compliance_finding(
     )
 
 
-def _near_zones(
-    requirements: RouteRequirements, visits: Records, moves: Records, navigation_error: float
-) -> dict[int, float]:
-    """Return the distance of each zone that a path passes by less than the navigation error, m, the nearest first.
-
-    visits: the path's visits, in which the depth of a zone that is not the nearest may be larger than its real one.
-    """
-    records, terrain = requirements.airspace.records, requirements.setup.scenario.terrain
-    distances = {}
-    for zone in np.flatnonzero(visits["depth"] > -navigation_error).tolist():
-        visit = path_zones(moves, ZoneRecords(records.zones[zone : zone + 1], records.edges), terrain)[0]
-        if not visit.unknown and -visit.depth < navigation_error:
-            distances[zone] = -float(visit.depth)
-    return dict(sorted(distances.items(), key=lambda near: near[1]))
-
-
 def _zone_finding(
     requirements: RouteRequirements, zone_number: int, planned_visit: Record, flown_visit: Record | None
 ) -> Finding:
@@ -186,8 +174,12 @@ def _zone_finding(
     if zone.kind == "inclusion":
         side_text, deepest_text, entry_text, exit_text = ("outside", "farthest out", "leaves it", "enters it again")
     subject = "path" if flown_visit is None else "flight"
-    faults, notes = [], []
+    faults, notes, facts = [], [], list[Fact]()
     if visit.depth > ROUNDING_M:
+        facts = [Fact("time beyond", visit.violation_time, "s"), Fact("entries", float(visit.entries), "1")]
+        for event in ("entry", "exit"):
+            for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
+                facts.append(Fact(f"{event} {coordinate}", float(visit[f"{event}_{coordinate}"]), unit))
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
@@ -226,17 +218,8 @@ def _zone_finding(
         margin=-visit.depth,
         unit="m",
         method=_METHOD,
-        facts=_visit_facts(visit) if visit.depth > ROUNDING_M else (),
+        facts=facts,
     )
-
-
-def _visit_facts(visit: Record) -> list[Fact]:
-    """Return facts on a violation: its duration, its entries, and where it begins and ends."""
-    facts = [Fact("time beyond", visit.violation_time, "s"), Fact("entries", float(visit.entries), "1")]
-    for event in ("entry", "exit"):
-        for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
-            facts.append(Fact(f"{event} {coordinate}", float(visit[f"{event}_{coordinate}"]), unit))
-    return facts
 
 
 def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> str:

@@ -207,6 +207,13 @@ def _find_landing(
     previous_item = int(setup.route.items[waypoint - 1])
     previous_place = landing_sequence(mission, origin, terrain, previous_item)[:1] if previous_item >= 0 else ()
     destinations = landing_starts(mission, origin, terrain) or previous_place
+    unknown_path_text = "" if destinations else "no waypoint before the landing is known to fly back to"
+    next_item = next((mission_item for mission_item in mission.items if mission_item.seq == item.seq + 1), None)
+    # This command takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
+    is_overriding = next_item is not None and next_item.command == Command.NAV_CONTINUE_AND_CHANGE_ALT
+    if next_item is not None and is_overriding and int(next_item.params[0]) in (0, 1):
+        name = command_name(next_item.command)
+        unknown_path_text = f"{name} (item {next_item.seq}) follows the landing, and is flown instead"
     ground_altitude = setup.route.landing_ground
     terrain_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
     if (
@@ -235,25 +242,8 @@ def _find_landing(
         climb_height=climb_height,
         destinations=destinations,
         item=item,
-        unknown_path_text=_unknown_path_text(requirements, item, destinations),
+        unknown_path_text=unknown_path_text,
     )
-
-
-def _unknown_path_text(
-    requirements: RouteRequirements, item: MissionItem, destinations: tuple[LandingStart, ...]
-) -> str:
-    """Explain why the path of a go-around after a landing item is unknown; return "" if it is known."""
-    next_item = next(
-        (mission_item for mission_item in requirements.setup.mission.items if mission_item.seq == item.seq + 1), None
-    )
-    # This command takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
-    if (
-        next_item is not None
-        and next_item.command == Command.NAV_CONTINUE_AND_CHANGE_ALT
-        and int(next_item.params[0]) in (0, 1)
-    ):
-        return f"{command_name(next_item.command)} (item {next_item.seq}) follows the landing, and is flown instead"
-    return "" if destinations else "no waypoint before the landing is known to fly back to"
 
 
 def _go_around_finding(
@@ -289,15 +279,27 @@ def _go_around_finding(
     if worst.is_clear:
         fault = message(f"{climb_text}; at least {worst.lowest_height:.0f} m above ground on the way back")
     else:
+        if not math.isnan(worst.impact_time):
+            brief, outcome = "hits the ground", f"hits the ground {worst.impact_time:.0f} s later"
+        elif worst.entered_hazard or worst.is_lost:
+            hazard = worst.entered_hazard
+            brief = outcome = f"enters {hazard}" if hazard else "does not get back to the approach"
+        else:
+            brief = "comes too close to the ground"
+            outcome = f"descends to {worst.lowest_height:.0f} m above ground on the way back"
+        turn_text = " is already above this height, turns at once and" if worst.turns_at_once else ""
+        outcome_text = (
+            f"after an abort {worst.abort_height:.0f} m above ground, {worst.abort_distance:.0f} m before the landing"
+            f" point, the aircraft{turn_text} {outcome} ({climb_text})"
+        )
+        remedy_text = _NO_HEIGHT_TEXT
         sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.abort_distance)
-        remedy_text = (
-            f"A climb to {sufficient_height:.0f} m above home is sufficient: set parameter 1 of item"
-            f" {landing.item.seq} to this height"
-        )
-        fault = message(
-            _brief_outcome(worst),
-            f": {_outcome_text(worst)} ({climb_text}). {remedy_text if sufficient_height > 0.0 else _NO_HEIGHT_TEXT}",
-        )
+        if sufficient_height > 0.0:
+            remedy_text = (
+                f"A climb to {sufficient_height:.0f} m above home is sufficient: set parameter 1 of item"
+                f" {landing.item.seq} to this height"
+            )
+        fault = message(f"a go-around {brief}", f": {outcome_text}. {remedy_text}")
     ok = worst.is_clear or (False if is_required else None)
     return make_finding(
         "go_around",
@@ -403,10 +405,10 @@ def _judge_go_around(
     top_altitude: altitude at which the climb ends, m AMSL.
     """
     climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["outcome"])
-    go_around = go_around._replace(
-        is_lost=end_status == RETURN_TIMEOUT,
-        unknown_part_text=_unknown_part_text(end_status, has_climbed=climb_end < len(positions)),
-    )
+    unknown_part_text = "" if end_status != RETURN_OFF_TERRAIN else "the way back leaves the terrain data"
+    if unknown_part_text and climb_end == len(positions):
+        unknown_part_text = "the aircraft leaves the terrain data before it reaches that height"
+    go_around = go_around._replace(is_lost=end_status == RETURN_TIMEOUT, unknown_part_text=unknown_part_text)
     if destination.is_landing and climb_end < len(positions):
         # It is unknown where the aircraft joins the glide: judge only the climb.
         positions, end_status = positions[: climb_end + 1], 0
@@ -435,7 +437,13 @@ def _judge_go_around(
         go_around = go_around._replace(
             unknown_part_text=f"{passing_text}; the flight may be {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
         )
-    required = _required_heights(terrain, destination, 0.5 * (positions[:-1] + positions[1:]))[climb_end:]
+    # On the path back, the required height is that of the destination near one that is lower.
+    middles = (0.5 * (positions[:-1] + positions[1:]))[climb_end:]
+    required = np.full(len(middles), GO_AROUND_CLEARANCE_M)
+    for east, north, up in (start.position for start in (destination, *destination.next_stops)):
+        destination_height = up - float(terrain.height(east, north))
+        is_near = np.hypot(middles[:, 0] - east, middles[:, 1] - north) <= LINE_UP_DISTANCE_M
+        required[is_near] = np.fmin(required[is_near], destination_height)
     return_heights = np.where(np.isnan(heights[climb_end:]), math.inf, heights[climb_end:])
     if not return_heights.size:
         return go_around._replace(min_climb_height=min_climb_height)
@@ -445,35 +453,6 @@ def _judge_go_around(
         lowest_height=float(return_heights[lowest_row]),
         required_height=float(required[lowest_row]),
     )
-
-
-def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
-    """Describe the unknown part of a go-around; return "" if the path is known.
-
-    end_status: status with which the simulation ended.
-    has_climbed: True if the go-around reaches the height at which its climb ends.
-    """
-    if end_status != RETURN_OFF_TERRAIN:
-        return ""
-    return (
-        "the way back leaves the terrain data"
-        if has_climbed
-        else "the aircraft leaves the terrain data before it reaches that height"
-    )
-
-
-def _required_heights(terrain: Terrain, destination: LandingStart, points: Floats) -> Floats:
-    """Return the required heights above ground on the path back, m: an array (n,) for `points` (n, 3).
-
-    The requirement is `GO_AROUND_CLEARANCE_M`, or near a lower destination the height of that destination.
-    """
-    required = np.full(len(points), GO_AROUND_CLEARANCE_M)
-    for east, north, up in (start.position for start in (destination, *destination.next_stops)):
-        height = up - float(terrain.height(east, north))
-        is_near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= LINE_UP_DISTANCE_M
-        if height < GO_AROUND_CLEARANCE_M:
-            required[is_near] = np.minimum(required[is_near], height)
-    return required
 
 
 def _next_sufficient_height(
@@ -496,37 +475,6 @@ def _next_sufficient_height(
         else:
             return float(height)
     return math.nan
-
-
-def _brief_outcome(worst: _GoAround) -> str:
-    """Describe the outcome of the worst go-around in a few words."""
-    if not math.isnan(worst.impact_time):
-        return "a go-around hits the ground"
-    if worst.entered_hazard:
-        return f"a go-around enters {worst.entered_hazard}"
-    return (
-        "a go-around does not get back to the approach"
-        if worst.is_lost
-        else "a go-around comes too close to the ground"
-    )
-
-
-def _outcome_text(worst: _GoAround) -> str:
-    """Describe the abort and the outcome of the worst go-around."""
-    abort_text = (
-        f"after an abort {worst.abort_height:.0f} m above ground,"
-        f" {worst.abort_distance:.0f} m before the landing point,"
-    )
-    turn_text = " is already above this height, turns at once and" if worst.turns_at_once else ""
-    if not math.isnan(worst.impact_time):
-        outcome = f"hits the ground {worst.impact_time:.0f} s later"
-    elif worst.entered_hazard:
-        outcome = f"enters {worst.entered_hazard}"
-    elif worst.is_lost:
-        outcome = "does not get back to the approach"
-    else:
-        outcome = f"descends to {worst.lowest_height:.0f} m above ground on the way back"
-    return f"{abort_text} the aircraft{turn_text} {outcome}"
 
 
 RULE = Rule(

@@ -14,7 +14,7 @@ from flight.mission.ground_phases import TakeOff
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, finding_reason, make_finding, message
 from logs.verdict.measures.ground_paths import GroundPath, first_hazard_on_path, min_path_clearance, track_path
-from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import Rule
 from logs.verdict.suggestions import suggest_better_launch
@@ -34,16 +34,14 @@ from world.terrain import Terrain
 def launch_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown take-off with one finding; return [] if no take-off was flown."""
-    ground = requirements.ground_phases
+    """Judge a flown take-off with one finding; return [] if no take-off was flown.
+
+    It is judged by its motor start, height reached and lost, runway, ground clearance and hazards.
+    """
+    ground, terrain = requirements.ground_phases, requirements.setup.scenario.terrain
     if ground is None or ground.procedures.take_off is None:
         return []
-    return [_launch_finding(requirements, ground, ground.procedures.take_off)]
-
-
-def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
-    """Judge a flown take-off: motor start, height reached and lost, runway, ground clearance and hazards."""
-    track = ground.launch
+    take_off, track = ground.procedures.take_off, ground.launch
     position, distances = path = track_path(track)
     height_lost = float(position[0, 2] - position[:, 2].min())
     clearance, distance = _climb_clearance(requirements, path)
@@ -61,7 +59,14 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
                 f"sinks {height_lost:.1f} m after the launch", f"; at most {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed"
             )
         )
-    runway_left = _remaining_runway(requirements, take_off, position)
+    # Runway left at the aircraft's last contact with it.
+    runway_left = math.inf
+    if take_off.launch.method == "runway" and terrain is not None:
+        heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+        standing_height = float(position[0, 2] - take_off.home[2])
+        contact_rows = np.flatnonzero(heights <= standing_height + CONTACT_HEIGHT_M)
+        last = position[contact_rows[-1] if contact_rows.size else 0]
+        runway_left = take_off.launch.effective_length - math.dist(last[:2], take_off.home[:2])
     if runway_left < RUNWAY_MARGIN_M:
         brief = f"leaves the ground {take_off.launch.effective_length - runway_left:.0f} m from home"
         runway_text = f"; {RUNWAY_MARGIN_M:.0f} m of the {take_off.launch.effective_length:.0f} m runway must be left"
@@ -73,7 +78,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     entered_hazard = first_hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
-    notes = _describe_take_off(take_off, track, distances, clearance, requirements.setup.scenario.terrain)
+    notes = _describe_take_off(take_off, track, distances, clearance, terrain)
     undecided_messages = []
     if not faults and LAUNCH_CLEARANCE_M <= clearance < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
@@ -84,23 +89,25 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         undecided_messages.append(message(brief, error_text))
     elif not faults and math.isnan(clearance):
         undecided_messages.append(message("the terrain below the launch's climb is unknown"))
-    return make_finding(
-        "launch",
-        requirements.waypoint(take_off.waypoint),
-        ok=False if faults else None if undecided_messages else True,
-        reason=finding_reason(faults or undecided_messages, notes),
-        faults=faults or undecided_messages,
-        flown=clearance,
-        limit=LAUNCH_CLEARANCE_M,
-        at_least=True,
-        source="check",
-        tolerance=0.0,
-        margin=clearance - LAUNCH_CLEARANCE_M,
-        unit="m",
-        method="exact along the flown track",
-        check=GROUND_PATH if undecided_messages else "",
-        facts=(Fact("height lost", height_lost, "m"), Fact("runway left", runway_left, "m")),
-    )
+    return [
+        make_finding(
+            "launch",
+            requirements.waypoint(take_off.waypoint),
+            ok=False if faults else None if undecided_messages else True,
+            reason=finding_reason(faults or undecided_messages, notes),
+            faults=faults or undecided_messages,
+            flown=clearance,
+            limit=LAUNCH_CLEARANCE_M,
+            at_least=True,
+            source="check",
+            tolerance=0.0,
+            margin=clearance - LAUNCH_CLEARANCE_M,
+            unit="m",
+            method="exact along the flown track",
+            check=GROUND_PATH if undecided_messages else "",
+            facts=(Fact("height lost", height_lost, "m"), Fact("runway left", runway_left, "m")),
+        )
+    ]
 
 
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
@@ -124,19 +131,6 @@ def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple
     if distances[-1] <= first_distance:
         return math.inf, math.nan
     return min_path_clearance(terrain, path.between(first_distance, float(distances[-1])))
-
-
-def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
-    """Return the runway left at the aircraft's last contact with it, m; inf without a runway."""
-    terrain = requirements.setup.scenario.terrain
-    if take_off.launch.method != "runway" or terrain is None:
-        return math.inf
-    standing_height = float(position[0, 2] - take_off.home[2])
-    contact_rows = np.flatnonzero(
-        position[:, 2] - terrain.height(position[:, 0], position[:, 1]) <= standing_height + CONTACT_HEIGHT_M
-    )
-    last = position[contact_rows[-1] if contact_rows.size else 0]
-    return take_off.launch.effective_length - math.dist(last[:2], take_off.home[:2])
 
 
 def _describe_take_off(

@@ -112,7 +112,15 @@ def judge_link(
     returns, reaction_text = None, ""
     if is_noticed:
         returns = _judge_reaction_returns(whole_requirements, track, outages, reactions, fly_again)
-        reaction_text = _reaction_text(setup.autopilot.title, reactions, returns)
+        action_texts = [
+            f"{ACTION_TEXTS[reaction.action]} after {reaction.delay:g} s ({reaction.parameter} {reaction.value:g})"
+            for reaction in reactions
+        ]
+        reaction_text = f". If the link is lost, {setup.autopilot.title} {', then '.join(action_texts)}"
+        if returns is not None:
+            reaction_text += f": {headline(returns)}"
+        elif any(reaction.action == "return" for reaction in reactions):
+            reaction_text += ": not judged, because the mission has no home"
     elif judged_link.outages and not reactions:
         setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
         reaction_text = f". If the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
@@ -241,22 +249,6 @@ def period_text(outage: Outage) -> str:
     """
     digits = 1 if outage.duration < _SHORT_OUTAGE_S else 0
     return f"{outage.start:.{digits}f} to {outage.end:.{digits}f} s"
-
-
-def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: Returns | None) -> str:
-    """Describe the autopilot's reactions to the loss of the link, and the outcome of its returns.
-
-    title: name of the autopilot.
-    """
-    texts = [
-        f"{ACTION_TEXTS[reaction.action]} after {reaction.delay:g} s ({reaction.parameter} {reaction.value:g})"
-        for reaction in reactions
-    ]
-    text = f". If the link is lost, {title} {', then '.join(texts)}"
-    if returns is not None:
-        return f"{text}: {headline(returns)}"
-    has_return = any(reaction.action == "return" for reaction in reactions)
-    return f"{text}: not judged, because the mission has no home" if has_return else text
 
 
 def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, link_along_path: LinkAlongPath) -> Place:

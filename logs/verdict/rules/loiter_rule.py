@@ -7,6 +7,7 @@ merged into one, and each rule keeps only its worst finding on the legs between 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -178,45 +179,55 @@ def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
     """Judge one loiter by its radius and by the findings on its corners, which this finding replaces."""
-    is_known = bool(np.isfinite(requirements.turn_limit[circle.first : circle.last + 1]).all())
-    min_radius = _min_radius(requirements, circle) if is_known else math.nan
-    corner_findings = [_unjudge_if_unreached_corner(aligned, finding) for finding in corner_findings]
+    # A flight that ended before a corner does not fail there: the completion rule judges the early end.
+    corner_findings = [
+        replace(finding, ok=None)
+        if finding.ok is False
+        and not (aligned is None or finding.place.index is None or aligned.passed[finding.place.index])
+        else finding
+        for finding in corner_findings
+    ]
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
-    joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
-    uses_parameter = _uses_parameter_radius(requirements, circle)
-    if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
-        failed_corners = []
-    faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
-    undecided_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
-    faults = [] if undecided_texts else faults
-    facts = [*undecided_texts, f"{_planned_laps_text(requirements, circle)}, with a radius of {circle.radius:.0f} m"]
-    hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
-    if uses_parameter and faults and math.isfinite(min_radius):
-        # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
-        bank = _held_bank(requirements, circle, min_radius, corner_findings)
-        if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(f"flown wider than {parameter_name}: the bank limit requires a radius of {min_radius:.0f} m")
-            faults = []
-            hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
-        else:
-            facts.append(f"{parameter_name}, held with {math.degrees(bank):.0f}° of bank")
+    rules, loiter = requirements.setup.autopilot.loiters, _stated_loiter(requirements, circle)
+    # Without a radius in its item, a loiter is flown with the radius of a parameter.
+    uses_parameter = (
+        rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
+    )
+    if rules.steers_to_center and aligned is None:
+        failed_corners = [] if uses_parameter else failed_corners
+    elif rules.steers_to_center and aligned is not None:
+        # The flight has arrived if it came close enough to the center.  The corners do not show the arrival, because a
+        # flight that leaves the loiter early may miss all of them.
+        distances, _ = closest_approaches(aligned.track.position, circle.center)
+        altitude = float(requirements.points[circle.first, 2])
+        arrival_distance = circle.radius + requirements.setup.autopilot.turns.distance(math.pi, altitude)
+        if distances.min() <= arrival_distance + WAYPOINT_PASS_MARGIN_M:
+            failed_corners = []
+    judgement = _judge_radius(
+        requirements, circle, corner_findings, uses_parameter=uses_parameter, is_flown=aligned is not None
+    )
+    faults, facts = judgement.faults, judgement.facts
     faults += _corner_faults(requirements, aligned, circle, failed_corners, has_faults=bool(faults))
-    radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
+    radii, laps = _measure_circles(requirements, aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
     max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
-    if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
+    if rules.steers_to_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
         faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
     ok: bool | None = not (faults or failed_corners)
-    facts += _flown_facts(requirements, aligned, circle, radii)
+    if radii.size:
+        laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
+        facts.append(f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center")
     has_unjudged = any(finding.ok is None and finding.check != UNKNOWN_AIRCRAFT for finding in corner_findings)
-    if ok and has_unjudged and not _is_whole(requirements, aligned, circle):
+    # A loiter that ends at an altitude needs no number of laps.
+    is_to_altitude = loiter is not None and loiter.to_altitude
+    is_whole = math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)
+    if ok and has_unjudged and not is_whole:
         ok = None
         is_complete = aligned is not None and bool(aligned.passed[circle.last])
         facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
-    check = UNKNOWN_AIRCRAFT if undecided_texts else UNKNOWN_PATH if hazards_text else ""
-    if ok and check:
+    if ok and judgement.check:
         ok = None
-        facts += [hazards_text] if hazards_text else []
+        facts += [judgement.hazards_text] if judgement.hazards_text else []
     return make_finding(
         "loiter",
         requirements.waypoint(circle.first),
@@ -225,20 +236,84 @@ def _loiter_finding(
         faults=faults,
         planned=circle.radius,
         flown=mean_radius,
-        limit=min_radius,
+        limit=judgement.min_radius,
         at_least=True,
-        source="aircraft" if is_known else "none",
+        source="none" if math.isnan(judgement.min_radius) else "aircraft",
         tolerance=LOITER_RADIUS_TOLERANCE_M,
-        margin=circle.radius - min_radius,
+        margin=circle.radius - judgement.min_radius,
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
-        check=check if ok is None else "",
+        check=judgement.check if ok is None else "",
     )
 
 
-def _may_pass(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
-    """Return True if the largest bank limit that the aircraft may have permits the loiter's radius."""
-    return circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M
+class _RadiusJudgement(NamedTuple):
+    """Judgement of a loiter's radius.
+
+    min_radius: smallest radius that the bank limit permits, m; NaN if the limit is unknown.
+    faults, facts: what the finding states about the radius and the laps.
+    check: `UNKNOWN_AIRCRAFT` or `UNKNOWN_PATH` if the radius cannot be judged, otherwise "".
+    hazards_text: hazards too close to a loiter that is flown wider than drawn; "" without hazards.
+    """
+
+    min_radius: float
+    faults: list[Message]
+    facts: list[str]
+    check: str
+    hazards_text: str
+
+
+def _judge_radius(
+    requirements: RouteRequirements,
+    circle: LoiterCircle,
+    corner_findings: list[Finding],
+    *,
+    uses_parameter: bool,
+    is_flown: bool,
+) -> _RadiusJudgement:
+    """Judge whether the aircraft can fly a loiter's radius in this wind.
+
+    uses_parameter: True if a parameter states the radius.
+    is_flown: True after a flight, which shows where the aircraft circled.
+    """
+    setup, max_bank = requirements.setup, requirements.limits.max_bank
+    is_known = bool(np.isfinite(requirements.turn_limit[circle.first : circle.last + 1]).all())
+    min_radius = _min_radius(requirements, circle) if is_known else math.nan
+    loiter, laps_text = _stated_loiter(requirements, circle), f"{circle.laps:.2f} laps from joining to leaving"
+    if loiter is not None and loiter.turns:
+        laps_text = f"{loiter.turns:g} {'lap' if loiter.turns == 1.0 else 'laps'} planned ({laps_text})"
+    facts = [f"{laps_text}, with a radius of {circle.radius:.0f} m"]
+    if not is_known or circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
+        return _RadiusJudgement(min_radius, [], facts, "", "")
+    speed = float(requirements.route.leg_airspeeds[circle.first])
+    need_text = f"at {speed:.0f} m/s and {bank_limit_text(setup)} the aircraft needs {min_radius:.0f} m"
+    if not math.isfinite(min_radius):
+        need_text = f"at {speed:.0f} m/s the circle cannot be flown"
+    fault = message(f"the radius is {circle.radius:.0f} m, but {need_text} in this wind")
+    # The largest bank limit that the aircraft may have permits the radius.
+    if circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M:
+        return _RadiusJudgement(min_radius, [], [fault.text, *facts], UNKNOWN_AIRCRAFT, "")
+    if not uses_parameter or not math.isfinite(min_radius):
+        return _RadiusJudgement(min_radius, [fault], facts, "", "")
+    # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.  The bank
+    # held is the largest measured one-second mean, or else the bank that the radius needs, up to the autopilot's limit.
+    parameter_name = setup.autopilot.loiters.radius_name
+    measured_banks = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
+    needed_bank = math.atan(math.tan(max_bank) * min_radius / circle.radius)
+    bank = math.radians(max(measured_banks)) if measured_banks else min(setup.autopilot.turns.max_bank, needed_bank)
+    if bank > max_bank + BANK_TOLERANCE_RAD + 1e-9:
+        facts.append(f"{parameter_name}, held with {math.degrees(bank):.0f}° of bank")
+        return _RadiusJudgement(min_radius, [fault], facts, "", "")
+    facts.append(f"flown wider than {parameter_name}: the bank limit requires a radius of {min_radius:.0f} m")
+    heights = requirements.points[circle.first : circle.last + 1, 2]
+    reach, hazards = LOITER_SWING_RADII * min_radius, []
+    if not is_flown:
+        hazards = find_hazards(requirements, circle.center, float(heights.min()), float(heights.max()), reach)
+    hazards_text = (
+        f"the aircraft may get {reach:.0f} m from the center, and there, {', '.join(hazards)}; only a simulated flight"
+        " shows where the aircraft circles"
+    )
+    return _RadiusJudgement(min_radius, [], facts, UNKNOWN_PATH if hazards else "", hazards_text if hazards else "")
 
 
 def _corner_faults(
@@ -281,9 +356,7 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possib
     """
     radii = requirements.possible_min_radius if possible else requirements.min_radius
     min_radius = float(radii[circle.first : circle.last + 1].max())
-    setup = requirements.setup
-    item = next((item for item in setup.mission.items if item.seq == setup.route.items[circle.first]), None)
-    loiter = None if item is None else stated_loiter(item)
+    setup, loiter = requirements.setup, _stated_loiter(requirements, circle)
     if loiter is None or not loiter.endless:
         return min_radius
     altitude = float(requirements.points[circle.first, 2])
@@ -299,140 +372,37 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possib
     )
 
 
-def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
-    """Return the distances of the track's rows from a loiter's center, m, (n,).
-
-    The rows are those from the first to the last corner of the loiter.  The array is empty if the flight did not pass
-    the last corner.
-    """
-    first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
-    if not aligned.passed[circle.last] or last <= first:
-        return np.zeros(0)
-    offsets = aligned.track.position[first : last + 1, :2] - circle.center
-    return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
-
-
 def _stated_loiter(requirements: RouteRequirements, circle: LoiterCircle) -> Loiter | None:
     """Return the loiter that the mission item of a circle states; None without such an item."""
     seq = int(requirements.setup.route.items[circle.first])
     return next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
 
 
-def _planned_laps_text(requirements: RouteRequirements, circle: LoiterCircle) -> str:
-    """Describe the laps that the item of a loiter states, and the laps of its path from join to exit."""
-    drawn_text = f"{circle.laps:.2f} laps from joining to leaving"
-    loiter = _stated_loiter(requirements, circle)
-    if loiter is None or not loiter.turns:
-        return drawn_text
-    return f"{loiter.turns:g} {'lap' if loiter.turns == 1.0 else 'laps'} planned ({drawn_text})"
+def _measure_circles(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle
+) -> tuple[Floats, float]:
+    """Return the distances of the track's rows from a loiter's center, m, (n,), and the laps flown around it.
 
-
-def _flown_facts(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, radii: Floats
-) -> list[str]:
-    """Describe a flown loiter: its number of laps, if known, and its radii; [] if it was not flown.
-
-    radii: distances from the center, m, (n,).
+    The distances are those from the first to the last corner, the laps those between the waypoints before and after the
+    loiter.  Without a flight that passed the last corner, the array is empty and the number NaN.  The number is also
+    NaN if the autopilot follows the drawn corners instead of circling the center.
     """
-    laps = _flown_laps(requirements, aligned, circle)
-    laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
-    return [f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center"] if radii.size else []
-
-
-def _flown_laps(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> float:
-    """Return the laps flown around a loiter's center between the waypoints before and after it.
-
-    The number is NaN without a flight, if the flight did not reach the loiter's last corner, or if the autopilot
-    follows the drawn corners instead of circling the center.
-    """
-    follows_corners = not requirements.setup.autopilot.loiters.steers_to_center
-    if aligned is None or follows_corners or not aligned.passed[circle.last]:
-        return math.nan
-    rows = slice(int(aligned.rows[circle.first - 1]), int(aligned.rows[min(circle.last + 1, requirements.legs)]) + 1)
-    east, north = (aligned.track.position[rows, :2] - circle.center).T
-    is_on_circle = np.hypot(east, north) <= circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
-    steps = np.diff(np.unwrap(np.arctan2(east, north)))[is_on_circle[1:] & is_on_circle[:-1]]
-    return abs(float(steps.sum())) / (2.0 * math.pi)
-
-
-def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> bool:
-    """Return True if all laps of a loiter are known to be flown.
-
-    A loiter that ends at an altitude needs no number of laps.
-    """
-    loiter = _stated_loiter(requirements, circle)
-    is_to_altitude = loiter is not None and loiter.to_altitude
-    laps = _flown_laps(requirements, aligned, circle)
-    return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)
-
-
-def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
-    """Return True if a loiter's radius comes from a parameter, because its mission item states none."""
-    rules, seq = requirements.setup.autopilot.loiters, int(requirements.setup.route.items[circle.first])
-    loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
-    return rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
-
-
-def _held_bank(
-    requirements: RouteRequirements, circle: LoiterCircle, min_radius: float, corner_findings: list[Finding]
-) -> float:
-    """Return the bank held in a loiter that is tighter than the bank limit permits, rad.
-
-    The value is the largest measured one-second mean.  Without a measurement, it is the bank that the loiter's radius
-    needs, up to the autopilot's limit.
-    min_radius: radius at the bank limit, m.
-    """
-    measured_banks = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
-    if measured_banks:
-        return math.radians(max(measured_banks))
-    needed_bank = math.atan(math.tan(requirements.limits.max_bank) * min_radius / circle.radius)
-    return min(requirements.setup.autopilot.turns.max_bank, needed_bank)
-
-
-def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> str:
-    """Describe hazards too close to a loiter that is flown wider than drawn; "" if there are none.
-
-    min_radius: radius at the bank limit, with which the loiter is flown, m.
-    """
-    heights = requirements.points[circle.first : circle.last + 1, 2]
-    reach = LOITER_SWING_RADII * min_radius
-    hazards = find_hazards(requirements, circle.center, float(heights.min()), float(heights.max()), reach)
-    if not hazards:
-        return ""
-    reach_text = f"the aircraft may get {reach:.0f} m from the center, and there"
-    return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where the aircraft circles"
-
-
-def _unjudge_if_unreached_corner(aligned: AlignedTrack | None, corner_finding: Finding) -> Finding:
-    """Replace a failure by "not judged" if the flight ended before the finding's corner.
-
-    The completion rule judges the early end.
-    """
-    index = corner_finding.place.index
-    is_reached = aligned is None or index is None or bool(aligned.passed[index])
-    return corner_finding if is_reached or corner_finding.ok is not False else replace(corner_finding, ok=None)
-
-
-def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:
-    """Return True if the flight came close enough to a loiter's center to count as arrived.
-
-    The corners do not show the arrival, because a flight that leaves the loiter early may miss all of them.
-    """
-    distances, _ = closest_approaches(aligned.track.position, circle.center)
-    turn_distance = requirements.setup.autopilot.turns.distance(math.pi, float(requirements.points[circle.first, 2]))
-    return bool(distances.min() <= circle.radius + turn_distance + WAYPOINT_PASS_MARGIN_M)
-
-
-def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> list[Message]:
-    """Return a fault if a loiter's radius is below `min_radius`, the radius at the bank limit, m."""
-    if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
-        return []
-    speed = float(requirements.route.leg_airspeeds[circle.first])
-    bank_text = bank_limit_text(requirements.setup)
-    need_text = f"at {speed:.0f} m/s and {bank_text} the aircraft needs {min_radius:.0f} m"
-    if not math.isfinite(min_radius):
-        need_text = f"at {speed:.0f} m/s the circle cannot be flown"
-    return [message(f"the radius is {circle.radius:.0f} m, but {need_text} in this wind")]
+    radii, laps = np.zeros(0), math.nan
+    if aligned is None or not aligned.passed[circle.last]:
+        return radii, laps
+    first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
+    if last > first:
+        offsets = aligned.track.position[first : last + 1, :2] - circle.center
+        radii = np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
+    if requirements.setup.autopilot.loiters.steers_to_center:
+        end = min(circle.last + 1, requirements.legs)
+        rows = slice(int(aligned.rows[circle.first - 1]), int(aligned.rows[end]) + 1)
+        east, north = (aligned.track.position[rows, :2] - circle.center).T
+        max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+        is_on_circle = np.hypot(east, north) <= max_radius
+        steps = np.diff(np.unwrap(np.arctan2(east, north)))[is_on_circle[1:] & is_on_circle[:-1]]
+        laps = abs(float(steps.sum())) / (2.0 * math.pi)
+    return radii, laps
 
 
 def _corner_text(place: Place) -> str:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from flight.simulation.track import ROLL
-from logs.verdict.findings import Finding, Message, finding_reason, make_finding, message
+from logs.verdict.findings import Finding, finding_reason, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -34,8 +34,7 @@ def departure_findings(
         return [make_finding("departure", FLIGHT, ok=None, reason="the log has no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
-    max_bank, airspeed_faults = _max_finite(bank), _low_airspeed_faults(requirements, aligned)
-    faults = []
+    max_bank, faults = _max_finite(bank), []
     if aligned.bad_rows:
         time_text = f"at {aligned.first_bad:.1f} s" if math.isfinite(aligned.first_bad) else "without a time"
         faults.append(
@@ -45,7 +44,19 @@ def departure_findings(
         row = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
         limit_text = f", more than the limit of {math.degrees(MAX_CONTROLLED_BANK_RAD):.0f}°"
         faults.append(message(f"bank {math.degrees(bank[row]):.0f}° at {track.time[row]:.1f} s", limit_text))
-    faults += airspeed_faults
+    # The minimum airspeed of the Aerosonde is a constant; that of other aircraft is a multiple of the minimum level
+    # speed.  An imported flight of an unknown aircraft has none.
+    imported_log, envelope = requirements.setup.imported_log, requirements.setup.envelope
+    if imported_log is None or imported_log.aircraft_known:
+        min_airspeeds = np.full(len(track), MIN_CONTROLLED_AIRSPEED_MPS)
+        if requirements.setup.aircraft != "aerosonde":
+            level_speeds = np.interp(track.position[:, 2], envelope.amsl, envelope.level_speed_min)
+            min_airspeeds = MIN_CONTROLLED_STALL_RATIO * level_speeds
+        slow_rows = np.flatnonzero(track.airspeed < min_airspeeds)
+        if slow_rows.size:
+            row = int(slow_rows[0])
+            speed_text = f"airspeed {track.airspeed[row]:.1f} m/s at {track.time[row]:.1f} s"
+            faults.append(message(f"{speed_text}, below {min_airspeeds[row]:.1f} m/s"))
     is_contact = aligned.clearance <= 0.0
     if requirements.ground_phases is not None and not aligned.passed[-1]:
         is_contact[-1] |= aligned.clearance[-1] <= MAX_GEAR_HEIGHT_M
@@ -84,36 +95,6 @@ def _max_finite(values: Floats) -> float:
     """Return the largest finite value, or NaN if there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else math.nan
-
-
-def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
-    """Return a fault at the first row with an airspeed too low for controlled flight; [] if there is none.
-
-    An imported flight of an unknown aircraft is not judged.
-    """
-    imported_log = requirements.setup.imported_log
-    if imported_log is not None and not imported_log.aircraft_known:
-        return []
-    track = aligned.track
-    # The minimum airspeed of the Aerosonde is a constant; that of other aircraft is a multiple of the minimum
-    # level speed.
-    altitude = track.position[:, 2]
-    if requirements.setup.aircraft == "aerosonde":
-        min_airspeeds = np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)
-    else:
-        envelope = requirements.setup.envelope
-        min_airspeeds = np.asarray(
-            MIN_CONTROLLED_STALL_RATIO * np.interp(altitude, envelope.amsl, envelope.level_speed_min)
-        )
-    slow_rows = np.flatnonzero(track.airspeed < min_airspeeds)
-    if not slow_rows.size:
-        return []
-    row = int(slow_rows[0])
-    return [
-        message(
-            f"airspeed {track.airspeed[row]:.1f} m/s at {track.time[row]:.1f} s, below {min_airspeeds[row]:.1f} m/s"
-        )
-    ]
 
 
 RULE = Rule(

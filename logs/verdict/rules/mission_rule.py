@@ -60,7 +60,8 @@ C = Command
 def mission_findings(setup: FlightSetup) -> list[Finding]:
     """Run PX4's checks and planfly's own checks on a mission; each finding names the first item at fault."""
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.checks.feasibility
-    refuses = setup.autopilot.checks.dialect == "px4"
+    dialect = setup.autopilot.checks.dialect
+    refuses = dialect == "px4"
     checks = (
         ("checkMissionItemValidity", _check_validity(mission, refuses)),
         ("checkTakeoff", _check_takeoff(mission)),
@@ -72,14 +73,62 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkIfBelowHomeAltitude", _check_home_altitude(mission)),
         ("checkGeofence", _check_fence(setup)),
     )
-    if setup.autopilot.checks.dialect == "ardupilot":
-        findings = _universal_findings([list(remarks) for _, remarks in checks])
-    else:
-        findings = [_check_finding(name, list(remarks), refuses) for name, remarks in checks]
+    findings = []
+    for name, check_remarks in checks:
+        source, check, function_text = "PX4", name, f" (see PX4's function {name})"
+        remarks = list(check_remarks)
+        if dialect == "ardupilot":
+            # Items that only PX4 refuses do not concern a mission that ArduPlane flies.  The failures that remain hold
+            # for every autopilot, and do not carry PX4's name.
+            source, check, function_text = "mission", "", ""
+            remarks = [remark for remark in remarks if remark[0] is False]
+            if not remarks:
+                continue
+        # The finding has the gravest remark: failures come first, then undecided remarks, then mere notes.
+        results: list[tuple[bool | None, int | None, str | Message]] = [
+            ((False if refuses else None) if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks
+        ]
+        results.sort(key=lambda result: {False: 0, None: 1, True: 2}[result[0]])
+        ok, item, reason = results[0] if results else (True, None, "no objections")
+        fault = reason if isinstance(reason, Message) else message(reason)
+        more_text = f" (and {len(results) - 1} more)" if len(results) > 1 else ""
+        findings.append(
+            make_finding(
+                "mission",
+                Place("mission", item=item),
+                ok=ok,
+                reason=f"{fault.text}{more_text}{function_text}",
+                faults=[fault],
+                source=source,
+                method="mission items",
+                check=check,
+            )
+        )
+    refused_items = [
+        item
+        for item in mission.items
+        if command_support(item.command).arduplane == Treatment.REFUSED != command_support(item.command).px4
+    ]
+    if refused_items and dialect == "ardupilot":
+        function = "mavlink_int_to_mission_cmd"
+        more_text = f" (and {len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
+        command_text = f"ArduPlane does not support {command_name(refused_items[0].command)}"
+        fault = message(command_text, f"{more_text}; PX4 accepts it")
+        findings.append(
+            make_finding(
+                "mission",
+                Place("mission", item=refused_items[0].seq),
+                ok=False,
+                reason=f"{fault.text} (see ArduPlane's function {function})",
+                faults=[fault],
+                source="ArduPlane",
+                method="mission items",
+                check=function,
+            )
+        )
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
         *findings,
-        *_arduplane_refusal_findings(setup),
         *([_unjoined_finding(setup)] if setup.route.unjoined_stops else []),
         *_unreached_findings(setup),
         *_unsimulated_findings(setup),
@@ -90,85 +139,6 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
 # fly; otherwise it is undecided.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
-
-
-def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
-    """Return a finding for each check that fails for every autopilot, without PX4's name for it.
-
-    Items that only PX4 refuses are left out, because they do not concern a mission that ArduPlane flies.
-    """
-    findings = []
-    for remarks in remarks_by_check:
-        failures = [remark for remark in remarks if remark[0] is False]
-        if not failures:
-            continue
-        _, item, reason = failures[0]
-        fault = reason if isinstance(reason, Message) else message(reason)
-        more_text = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
-        findings.append(
-            make_finding(
-                "mission",
-                Place("mission", item=item),
-                ok=False,
-                reason=f"{fault.text}{more_text}",
-                faults=[fault],
-                source="mission",
-                method="mission items",
-            )
-        )
-    return findings
-
-
-def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
-    """Merge the remarks of a check into one finding, with the reason of the gravest remark.
-
-    check: name of PX4's function.
-    refuses: True if PX4 is to fly; items that it refuses then fail.
-    """
-    refusal_result = False if refuses else None
-    sorted_remarks = [(refusal_result if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
-    # Failures come first, then undecided remarks, then mere notes.
-    sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
-    ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "no objections")
-    first_message = reason if isinstance(reason, Message) else message(reason)
-    more_text = f" (and {len(sorted_remarks) - 1} more)" if len(sorted_remarks) > 1 else ""
-    return make_finding(
-        "mission",
-        Place("mission", item=item),
-        ok=ok,
-        reason=f"{first_message.text}{more_text} (see PX4's function {check})",
-        faults=[first_message],
-        source="PX4",
-        method="mission items",
-        check=check,
-    )
-
-
-def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
-    """Return one finding on items that only ArduPlane refuses at upload; [] for other autopilots."""
-    refused_items = [
-        item
-        for item in setup.mission.items
-        if command_support(item.command).arduplane == Treatment.REFUSED != command_support(item.command).px4
-    ]
-    if not refused_items or setup.autopilot.checks.dialect != "ardupilot":
-        return []
-    more_text = f" (and {len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
-    fault = message(
-        f"ArduPlane does not support {command_name(refused_items[0].command)}", f"{more_text}; PX4 accepts it"
-    )
-    return [
-        make_finding(
-            "mission",
-            Place("mission", item=refused_items[0].seq),
-            ok=False,
-            reason=f"{fault.text} (see ArduPlane's function mavlink_int_to_mission_cmd)",
-            faults=[fault],
-            source="ArduPlane",
-            method="mission items",
-            check="mavlink_int_to_mission_cmd",
-        )
-    ]
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:

@@ -10,6 +10,7 @@ from aircraft.envelope import ground_slope
 from logs.verdict.findings import (
     AIRCRAFT_SLOPE,
     GROUND_FOLLOWING_ERROR,
+    NOT_FLOWN,
     PITCH_LIMIT_TIME,
     UNKNOWN_AIRCRAFT,
     Fact,
@@ -19,10 +20,10 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.acceptance import descent_on_next_leg, step_height
+from logs.verdict.measures.acceptance import slope_with_next_leg, step_height
 from logs.verdict.measures.ground_following import follows_ground, mean_ground_slope, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
-from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
+from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_gentler_slope
@@ -54,9 +55,9 @@ def slope_findings(
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
             continue
-        slope = descent_on_next_leg(requirements, leg)
+        slope = slope_with_next_leg(requirements, leg)
         if slope is not None and (geometric or (aligned is not None and aligned.passed[leg + 1])):
-            findings.append(_unflown_descent_finding(requirements, leg, slope))
+            findings.append(_vertical_leg_finding(requirements, leg, slope, is_flown=not geometric))
             continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
@@ -66,27 +67,38 @@ def slope_findings(
     return findings
 
 
-def _unflown_descent_finding(requirements: RouteRequirements, leg: int, slope: float) -> Finding:
-    """Judge a vertical descent that is flown on the next leg.
+def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: float, *, is_flown: bool) -> Finding:
+    """Judge a vertical leg whose change of altitude is flown on the next leg.
 
-    slope: slope of the descent and the next leg together, rad, positive for a descent.
+    Without a flight a climb is not judged, because the aircraft is then below the next leg as drawn.
+
+    slope: slope of the vertical leg and the next leg together, rad, positive for a climb.
     """
-    limit, source = slope_limit(requirements, leg + 1, is_climb=False)
-    certain_limit = float(requirements.certain_dive[leg + 1])
-    check = UNKNOWN_AIRCRAFT if max(LEVEL_SLOPE_RAD, certain_limit) < slope and certain_limit < limit < math.inf else ""
-    height = float(requirements.points[leg, 2] - requirements.points[leg + 1, 2])
+    sign = math.copysign(1.0, slope)
+    limit, source = slope_limit(requirements, leg + 1, is_climb=sign > 0.0)
+    certain_limits = requirements.certain_climb if sign > 0.0 else requirements.certain_dive
+    is_uncertain = max(LEVEL_SLOPE_RAD, float(certain_limits[leg + 1])) < abs(slope)
+    check = UNKNOWN_AIRCRAFT if is_uncertain and float(certain_limits[leg + 1]) < limit < math.inf else ""
+    climb = float(requirements.points[leg + 1, 2] - requirements.points[leg, 2])
+    reason = (
+        f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {abs(climb):.0f} m"
+        f" {'up' if climb > 0.0 else 'down'} to it are flown on the next leg, which then needs"
+        f" {math.degrees(slope):+.2f}°"
+    )
+    if climb > 0.0 and not is_flown:
+        check = check or NOT_FLOWN
+        reason += ", and the aircraft flies below that leg as drawn, which only a flight can judge"
     return make_finding(
         "slope",
         requirements.leg(leg),
         ok=None if check else True,
-        reason=f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {height:.0f} m down to it are"
-        f" flown on the next leg, which then needs {-math.degrees(slope):+.2f}°",
-        planned=-math.degrees(slope),
-        limit=-math.degrees(limit),
-        at_least=True,
+        reason=reason,
+        planned=math.degrees(slope),
+        limit=math.degrees(sign * limit),
+        at_least=sign < 0.0,
         source=source,
         tolerance=math.degrees(PLAN_TOLERANCE_RAD),
-        margin=math.degrees(limit - slope),
+        margin=math.degrees(limit - abs(slope)),
         unit="deg",
         method="route",
         check=check,
@@ -104,26 +116,36 @@ def _leg_finding(
     planned_slope = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned_slope >= 0.0 else -1.0
-    if abs(planned_slope) <= LEVEL_SLOPE_RAD and not _is_in_envelope(requirements, leg):
-        # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
-        limit = max(limit, LEVEL_SLOPE_RAD)
+    if abs(planned_slope) <= LEVEL_SLOPE_RAD:
+        min_speed, max_speed = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
+        if not min_speed <= float(requirements.route.leg_airspeeds[leg]) <= max_speed:
+            # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
+            limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
+    measured_facts: list[Fact] = []
     is_plan_steep = bool(faults)
     arc_faults = _steep_arc_faults(requirements, leg, measure)
     ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
     if ground is not None:
         planned_slope, limit, source = ground.slope, ground.limit, ground.source
         sign = math.copysign(1.0, planned_slope)
-        faults = [_steep_ground_message(requirements, leg, ground)]
-    aircraft_facts = _aircraft_slope_facts(requirements, leg) if arc_faults or (faults and source == "aircraft") else []
+        faults = [ground.fault]
+    aircraft_facts = []
+    if arc_faults or (faults and source == "aircraft"):
+        aircraft_limits = requirements.climb if float(requirements.slopes[leg]) >= 0.0 else requirements.dive
+        aircraft_facts.append(Fact(AIRCRAFT_SLOPE, math.degrees(float(aircraft_limits[leg])), "deg"))
     # The text of a planned fault already states the planned slope.
     facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     slope_fit = measure.slope if measure is not None and ground is None else None
     method = "route"
     if measure is not None:
-        flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
+        flown_faults, flown_facts, measured_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
-        method = _fit_text(slope_fit) if slope_fit is not None else "not flown" if ground is None else "route"
+        if slope_fit is not None:
+            fit_text = "" if slope_fit.is_fitted else ", short leg,"
+            method = f"least squares{fit_text} over {slope_fit.length:.0f} m"
+        elif ground is None:
+            method = "not flown"
     # Faults of the arc come last, because the arc at a steep leg's end is steep, too.
     faults = faults + arc_faults
     uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, measure, has_failed=bool(faults))
@@ -151,53 +173,50 @@ def _leg_finding(
         unit="deg",
         method=method,
         check=check,
-        facts=(*_measured_facts(requirements, leg, measure), *aircraft_facts),
+        facts=(*measured_facts, *aircraft_facts),
     )
-
-
-def _fit_text(fit: LegFit) -> str:
-    """Describe the method by which a flown slope was measured."""
-    return f"least squares{'' if fit.is_fitted else ', short leg,'} over {fit.length:.0f} m"
 
 
 def _flown_messages(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
-) -> tuple[list[Message], list[str]]:
-    """Return the faults and the facts of a flown leg.
+) -> tuple[list[Message], list[str], list[Fact]]:
+    """Return the faults, the facts and the measurements of a flown leg.
 
     With the limits of a known aircraft, only exceeded limits and a lack of performance are faults.  The flown slope and
     the height error are then facts.
     limit: limit of the slope, rad.
     """
-    faults = [*_rate_limit_faults(requirements, leg, measure), *_performance_faults(requirements, leg, measure)]
-    planned_slope = abs(float(requirements.slopes[leg]))
-    # A leg that is too steep as planned has a fault that states its slope; otherwise the first fault states it.
-    is_planned_steep = planned_slope > limit + PLAN_TOLERANCE_RAD
-    need_text = "" if is_planned_steep else f"; the leg needs {math.degrees(planned_slope):.1f}°"
-    performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
+    performance_faults = _performance_faults(requirements, leg, measure, limit)
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-    named_facts = []
+    named_facts: list[tuple[str, str]] = []
+    measured: list[Fact] = []
     if measure.slope is not None:
         named_facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        line = "the leg's height above ground" if follows_ground(requirements, leg) else "the leg"
+        is_over_ground = follows_ground(requirements, leg)
+        line = "the leg's height above ground" if is_over_ground else "the leg"
         named_facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
-    named_facts += [
-        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
-        for name, duration, _, _ in _throttle_times(measure)
-        if duration >= 1.0
-    ]
+        measured.append(Fact(GROUND_FOLLOWING_ERROR if is_over_ground else "height error", measure.height_error, "m"))
+    if measure.slope is not None:
+        slope_error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
+        measured.append(Fact("slope error", slope_error, "deg"))
+    for name, duration, error, direction in _throttle_times(measure):
+        if duration >= 1.0:
+            named_facts.append((name, f"{_throttle_text(requirements, name)} for {duration:.0f} s"))
+        if duration > 0.0:
+            measured += [Fact(f"throttle at {name}", duration, "s"), Fact(f"too {direction}", error, "m/s")]
     if measure.pitch_limit_time >= SATURATED_TIME_S:
         limit_name = requirements.setup.autopilot.speeds.max_pitch_name
         named_facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
+        measured.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
     arc = steep_arc(requirements, leg)
     if arc is not None and _is_arc_within_tolerance(arc, measure):
         place = place_text(requirements.waypoint(leg + 1))
         named_facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     facts = [text for name, text in named_facts if name not in flown_faults]
     if requirements.envelope:
-        return performance_faults, facts + [fault.brief for fault in flown_faults.values()]
-    return [*flown_faults.values(), *performance_faults], facts
+        return performance_faults, facts + [fault.brief for fault in flown_faults.values()], measured
+    return [*flown_faults.values(), *performance_faults], facts, measured
 
 
 def _planned_slope_messages(
@@ -223,28 +242,39 @@ def _planned_slope_messages(
                 f"the ground falls at {math.degrees(-ground_slope):.1f}° on average, more steeply than the"
                 f" {math.degrees(limit):.1f}° that can be flown, so the aircraft gets too high, which is no failure"
             )
-        elif step is None:
-            faults.append(_steep_leg_message(requirements, leg, limit, source))
-        else:
+        elif step is not None:
             facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
+        else:
+            slope_text = f"at {math.degrees(abs(slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
+            if requirements.runs[leg] < MIN_LEG_LENGTH_M:
+                height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
+                slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(slope)):.1f}°"
+            number, verb = requirements.leg(leg).number, "climbs" if slope >= 0.0 else "descends"
+            if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
+                airspeed = float(requirements.route.leg_airspeeds[leg])
+                explanation = f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s"
+                faults.append(message(no_progress_text, explanation))
+            else:
+                limit_text = _limit_text(requirements, leg, limit, source)
+                certain_text = _certain_limit_text(requirements, leg, limit, source)
+                explanation = f"; {limit_text}; {certain_text}" if certain_text else f"; {limit_text}"
+                faults.append(message(f"leg {number} {verb} {slope_text}", explanation, placed=True))
     return faults, facts
 
 
 class _SteepGround(NamedTuple):
     """Ground that a leg follows and that is steeper than the aircraft or its autopilot can fly.
 
-    slope, length, excess: as in `GroundSlope`.
+    slope: as in `GroundSlope`.
     limit: rad, positive.
     source: source of the limit: "scenario", "aircraft" or "autopilot".
-    name: parameter of the autopilot with its value; "" for the other sources.
+    fault: states the slope and its limit, and how low the aircraft would get.
     """
 
     slope: float
-    length: float
-    excess: float
     limit: float
     source: str
-    name: str
+    fault: Message
 
 
 def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
@@ -258,51 +288,24 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
         return None
     if measure is not None and (measure.height_error is None or measure.height_error >= -_height_error_limit(measure)):
         return None
-    (limit, source), name = slope_limit(requirements, leg, is_climb=True), ""
+    (limit, source), rate_name = slope_limit(requirements, leg, is_climb=True), ""
     if measure is not None:
-        rate_slope, rate_name = _rate_limit_slope(requirements, leg, is_climb=True)
-        limit, source, name = (rate_slope, "autopilot", rate_name) if rate_slope < limit else (limit, source, name)
+        rate_slope, name = _rate_limit_slope(requirements, leg, is_climb=True)
+        limit, source, rate_name = (rate_slope, "autopilot", name) if rate_slope < limit else (limit, source, "")
     ground = steepest_ground(requirements, leg, limit)
     if ground is None or ground.excess <= NEGLIGIBLE_STEP_M:
         return None
-    return _SteepGround(*ground, limit, source, name)
-
-
-def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _SteepGround) -> Message:
-    """State that a leg follows ground steeper than its slope limit, and how low the aircraft would get."""
-    limit_text = f"{ground.name} allows only a climb of {math.degrees(ground.limit):.1f}°"
-    if not ground.name:
-        limit_text = _limit_text(requirements, leg, ground.limit, ground.source)
+    limit_text = (
+        f"{rate_name} allows only a climb of {math.degrees(limit):.1f}°"
+        if rate_name
+        else _limit_text(requirements, leg, limit, source)
+    )
     brief = (
         f"leg {requirements.leg(leg).number} follows ground that rises at {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
     explanation = f"; {limit_text}, so the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
-    return message(brief, explanation, placed=True)
-
-
-def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
-    """Explain why an uncertain aircraft model leaves a slope undecided; return "" if the slope is decided.
-
-    Only the limits of the aircraft are considered, not a lower limit of the scenario.
-    """
-    planned_slope, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
-    limits, certain_limits, verb = (
-        (requirements.climb, requirements.certain_climb, "climbs")
-        if planned_slope >= 0.0
-        else (requirements.dive, requirements.certain_dive, "descends")
-    )
-    limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
-    # Without the aircraft's limits there is no uncertain limit.
-    if abs(planned_slope) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
-        return ""
-    angles = abs(planned_slope), limit, _limit_deviation(requirements, leg, limit, certain_limit), certain_limit
-    slope, limit_deg, deviation_deg, certain_deg = (math.degrees(angle) for angle in angles)
-    return (
-        f"{verb} at {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ±"
-        f" {deviation_deg:.1f}°, so"
-        f" only {certain_deg:.1f}° is certain"
-    )
+    return _SteepGround(ground.slope, limit, source, message(brief, explanation, placed=True))
 
 
 def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
@@ -329,15 +332,38 @@ def _ability_text(
 ) -> str:
     """Explain what an uncertain aircraft model does: it leaves a slope undecided or limits suggestions.
 
-    Return "" for an aircraft without uncertainty.  Return "" also for a planned slope above the limit, because its own
-    message states the limit.
+    Return "" for an aircraft without uncertainty, and for a decided slope.  Return "" also for a planned slope above
+    the limit, because its own message states the limit.
     limit, source: limit of the slope, rad, and its source.
     has_failed: True if the leg fails.
     """
-    if not has_failed:
-        return _uncertainty_text(requirements, leg) or _shortfall_text(requirements, leg, measure)
-    is_planned_steep = abs(float(requirements.slopes[leg])) > limit
-    return "" if is_planned_steep else _certain_limit_text(requirements, leg, limit, source)
+    planned_slope, setup = float(requirements.slopes[leg]), requirements.setup
+    if has_failed:
+        return "" if abs(planned_slope) > limit else _certain_limit_text(requirements, leg, limit, source)
+    # Only the limits of the aircraft count here, not a lower limit of the scenario.
+    limits, certain_limits, verb = (
+        (requirements.climb, requirements.certain_climb, "climbs")
+        if planned_slope >= 0.0
+        else (requirements.dive, requirements.certain_dive, "descends")
+    )
+    aircraft_limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
+    # Without the aircraft's limits there is no uncertain limit.
+    if abs(planned_slope) > max(LEVEL_SLOPE_RAD, certain_limit) and certain_limit < aircraft_limit < math.inf:
+        deviation = math.degrees(_limit_deviation(requirements, leg, aircraft_limit, certain_limit))
+        return (
+            f"{verb} at {math.degrees(abs(planned_slope)):.1f}°; the limit according to {setup.envelope.source} is"
+            f" {math.degrees(aircraft_limit):.1f}° ± {deviation:.1f}°, so only {math.degrees(certain_limit):.1f}° is"
+            " certain"
+        )
+    # The leg is undecided, too, if the model misses the climb that was stated for the aircraft.
+    if measure is not None and measure.ability is not None and _missing_ability(requirements, leg, measure):
+        shown = measure.ability.slope
+        stated = _climb_shortfall(requirements, leg) + shown
+        return (
+            f"climbs at {math.degrees(planned_slope):.1f}°; the model climbs {math.degrees(shown):.1f}° at"
+            f" {setup.autopilot.speeds.max_throttle_name}, but up to {math.degrees(stated):.1f}° was stated for it"
+        )
+    return ""
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
@@ -388,31 +414,6 @@ def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
     Other rules judge the airspeed and the height above ground on the arc.
     """
     return measure.is_finished and arc.missing_height <= HEIGHT_ERROR_LIMIT_M
-
-
-def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
-    """Return True if the aircraft can fly level at the leg's commanded airspeed."""
-    min_speed, max_speed = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
-    return min_speed <= float(requirements.route.leg_airspeeds[leg]) <= max_speed
-
-
-def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """State that the planned slope of a leg exceeds its limit (rad)."""
-    planned_slope = float(requirements.slopes[leg])
-    verb = "climbs" if planned_slope >= 0.0 else "descends"
-    slope_text = f"at {math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
-    if requirements.runs[leg] < MIN_LEG_LENGTH_M:
-        height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
-        slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
-    number = requirements.leg(leg).number
-    airspeed = float(requirements.route.leg_airspeeds[leg])
-    if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
-        return message(no_progress_text, f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s")
-    limit_texts = [
-        _limit_text(requirements, leg, limit, source),
-        _certain_limit_text(requirements, leg, limit, source),
-    ]
-    return message(f"leg {number} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
 
 
 def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
@@ -487,32 +488,6 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
     )
 
 
-def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
-    """Return the measurements of a flown leg as facts; [] for a leg that was not measured."""
-    if measure is None:
-        return []
-    error_name = GROUND_FOLLOWING_ERROR if follows_ground(requirements, leg) else "height error"
-    facts = [] if measure.height_error is None else [Fact(error_name, measure.height_error, "m")]
-    if measure.slope is not None:
-        error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
-        facts.append(Fact("slope error", error, "deg"))
-    for name, duration, error, direction in _throttle_times(measure):
-        facts += (
-            [Fact(f"throttle at {name}", duration, "s"), Fact(f"too {direction}", error, "m/s")]
-            if duration > 0.0
-            else []
-        )
-    if measure.pitch_limit_time >= SATURATED_TIME_S:
-        facts.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
-    return facts
-
-
-def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fact]:
-    """Return, as a fact, the steepest climb or descent that the aircraft can fly on a leg."""
-    limits = requirements.climb if float(requirements.slopes[leg]) >= 0.0 else requirements.dive
-    return [Fact(AIRCRAFT_SLOPE, math.degrees(float(limits[leg])), "deg")]
-
-
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> dict[str, Message]:
@@ -574,41 +549,45 @@ def _climb_shortfall(requirements: RouteRequirements, leg: int) -> float:
     return setup.envelope.climb_shortfall if is_limited else 0.0
 
 
-def _shortfall_text(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> str:
-    """Explain that a leg is undecided because the model misses the climb that was stated; "" if it is not."""
-    if measure is None or measure.ability is None or not _missing_ability(requirements, leg, measure):
-        return ""
-    setup = requirements.setup
-    stated, shown, needed = (
-        math.degrees(angle)
-        for angle in (
-            _climb_shortfall(requirements, leg) + measure.ability.slope,
-            measure.ability.slope,
-            float(requirements.slopes[leg]),
-        )
-    )
-    return (
-        f"climbs at {needed:.1f}°; the model climbs {shown:.1f}° at {setup.autopilot.speeds.max_throttle_name}, but"
-        f" up to {stated:.1f}° was stated for it"
-    )
+def _performance_faults(
+    requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
+) -> list[Message]:
+    """Return a fault for each limit of climb or descent that kept the aircraft from flying a leg.
 
-
-def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the aircraft climbed or sank less at the throttle limit than the leg needs."""
-    ability, planned_slope = measure.ability, float(requirements.slopes[leg])
-    if ability is None or _missing_ability(requirements, leg, measure) <= _climb_shortfall(requirements, leg):
-        return []
-    verb = "climb" if planned_slope >= 0.0 else "sink"
-    limit_name = requirements.setup.autopilot.speeds.max_throttle_name if planned_slope >= 0.0 else ""
-    throttle_text = limit_name or f"{_throttle_limit(planned_slope)} throttle"
+    The limits are a climb or sink rate of the autopilot, and what the aircraft could fly at the throttle limit.
+    limit: limit of the slope, rad.
+    """
+    texts = []
+    planned_slope, ability = float(requirements.slopes[leg]), measure.ability
+    is_climb = planned_slope >= 0.0
     speed = float(requirements.route.leg_airspeeds[leg])
-    return [
-        message(
-            f"measured over {ability.duration:.0f} s at {throttle_text}: the aircraft can {verb} at most"
-            f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here, over the ground in the mean wind, without"
-            " gusts, vertical wind or a change of airspeed",
+    rate_slope, rate_name = _rate_limit_slope(requirements, leg, is_climb=is_climb)
+    if (
+        rate_slope < abs(planned_slope) - ABILITY_TOLERANCE_RAD
+        and measure.height_error is not None
+        and (-measure.height_error if is_climb else measure.height_error) > _height_error_limit(measure)
+    ):
+        text = (
+            f"{rate_name} allows only a {'climb' if is_climb else 'descent'} of {math.degrees(rate_slope):.1f}° at"
+            f" {speed:.1f} m/s"
         )
-    ]
+        altitude = float(requirements.points[leg : leg + 2, 2].mean())
+        tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
+        if math.hypot(tailwind, crosswind) >= CALM_WIND_MPS:
+            text += f", with {_wind_text(tailwind, crosswind)}"
+        texts.append(text)
+    if ability is not None and _missing_ability(requirements, leg, measure) > _climb_shortfall(requirements, leg):
+        limit_name = requirements.setup.autopilot.speeds.max_throttle_name if is_climb else ""
+        throttle_text = limit_name or f"{_throttle_limit(planned_slope)} throttle"
+        texts.append(
+            f"measured over {ability.duration:.0f} s at {throttle_text}: the aircraft can"
+            f" {'climb' if is_climb else 'sink'} at most {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here,"
+            " over the ground in the mean wind, without gusts, vertical wind or a change of airspeed"
+        )
+    # A leg that is too steep as planned has a fault that states its slope; otherwise the first fault states it.
+    if texts and abs(planned_slope) <= limit + PLAN_TOLERANCE_RAD:
+        texts[0] += f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°"
+    return [message(text) for text in texts]
 
 
 def _height_error_limit(measure: SlopeMeasure) -> float:
@@ -632,28 +611,6 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
     wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     slope = ground_slope(math.asin(min(1.0, rate_limit.rate / speed)), speed, *wind)
     return (math.inf if math.isnan(slope) else slope), rate_limit.name
-
-
-def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if a climb or sink rate limit kept the aircraft from the altitude of the leg."""
-    planned_slope = float(requirements.slopes[leg])
-    sign = 1.0 if planned_slope >= 0.0 else -1.0
-    slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)
-    if (
-        slope >= abs(planned_slope) - ABILITY_TOLERANCE_RAD
-        or measure.height_error is None
-        or -sign * measure.height_error <= _height_error_limit(measure)
-    ):
-        return []
-    speed = float(requirements.route.leg_airspeeds[leg])
-    altitude = float(requirements.points[leg : leg + 2, 2].mean())
-    text = (
-        f"{name} allows only a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s"
-    )
-    tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
-    if math.hypot(tailwind, crosswind) >= CALM_WIND_MPS:
-        text += f", with {_wind_text(tailwind, crosswind)}"
-    return [message(text)]
 
 
 RULE = Rule(

@@ -73,19 +73,20 @@ def _speed_finding(
     """Judge the flown airspeed and the airspeed that the mission commands on a leg (`demanded`, m/s)."""
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
-    notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
-    notes += _short_leg_notes(requirements, leg, commanded)
+    notes = _command_notes(requirements, leg, demanded, min_speed, max_speed)
     margin = min(commanded - min_speed, max_speed - commanded)
     at_least = commanded - min_speed <= max_speed - commanded
     limit = min_speed if at_least else max_speed
-    mean_speed, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
+    mean_speed, tolerance, facts, source, check = math.nan, 0.0, [], "aircraft", ""
     is_unflown = not geometric and (aligned is None or not aligned.has_flown(leg))
     if is_unflown:
         notes.append("the leg was not flown")
     elif aligned is not None:
         measurement = _measure_airspeed(requirements, aligned, leg)
         if measurement is None:
-            mean_speed = _nearest_mean_airspeed(aligned, leg, commanded)
+            # The one-second mean nearest to the command; on a leg shorter than one second, the mean over the leg.
+            means = _one_second_means(aligned, aligned.leg_rows(leg))
+            mean_speed = float(means[np.argmin(np.abs(means - commanded))])
             notes.append(f"{mean_speed:.1f} m/s reached; the leg is too short to hold it")
         else:
             mean_speed, tolerance, min_mean = measurement
@@ -106,14 +107,20 @@ def _speed_finding(
                 margin, tolerance = allowed_error - abs(mean_speed - commanded), held_speed.tolerance
                 faults.append(message(f"{mean_speed:.1f} m/s held instead of the commanded {commanded:.1f} m/s"))
         facts.append(Fact("speed error", mean_speed - commanded, "m/s"))
-    uncertainty = _uncertainty_text(requirements, leg, commanded, max_speed)
-    check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
+    envelope = requirements.setup.envelope
+    if envelope.fastest_sd:
+        # The maximum airspeed is uncertain: the command should stay below it by a margin.
+        altitudes, certain_envelope = requirements.points[leg : leg + 2, 2].tolist(), envelope.with_margin()
+        if commanded > min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
+            limit_text = f"the maximum level speed according to {envelope.source} is {max_speed:.1f} m/s TAS"
+            notes.insert(0, f"{commanded:.1f} m/s TAS is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s")
+            check = "" if faults else UNKNOWN_AIRCRAFT
     ok = None if check else not faults
     return make_finding(
         "speed",
         requirements.leg(leg),
         ok=None if ok and is_unflown else ok,
-        reason=finding_reason(faults, [*filter(None, [uncertainty]), *notes]),
+        reason=finding_reason(faults, notes),
         faults=faults,
         planned=commanded,
         flown=mean_speed,
@@ -127,19 +134,6 @@ def _speed_finding(
         check=check,
         facts=facts,
     )
-
-
-def _command_text(demanded: float, commanded: float, min_speed: float, max_speed: float) -> str:
-    """Describe the commanded airspeed on a leg, and the range of airspeeds in level flight, m/s.
-
-    demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
-    commanded: the commanded airspeed as true airspeed, m/s; the text states it only if it differs.
-    """
-    kind_text = "TAS" if demanded == commanded else f"EAS ({commanded:.1f} m/s TAS)"
-    if not (math.isfinite(min_speed) and math.isfinite(max_speed)):
-        return f"{demanded:.1f} m/s {kind_text} is commanded, but no level flight is known"
-    level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s TAS"
-    return f"{demanded:.1f} m/s {kind_text} is commanded; {level_text}"
 
 
 class _HeldSpeed(NamedTuple):
@@ -190,92 +184,65 @@ def _find_held_speed(
     return _HeldSpeed(speed, allowed_error, tolerance)
 
 
-def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
-    """Compare a commanded airspeed with the maximum airspeed and its standard deviation, as text.
+def _command_notes(
+    requirements: RouteRequirements, leg: int, demanded: float, min_speed: float, max_speed: float
+) -> list[str]:
+    """Describe the airspeed that the mission commands on a leg, and what keeps the aircraft from flying it.
 
-    Return "" if the commanded airspeed is below the maximum even after a margin for this uncertainty.
-    """
-    envelope = requirements.setup.envelope
-    if not envelope.fastest_sd:
-        return ""
-    certain_envelope = envelope.with_margin()
-    altitudes = requirements.points[leg : leg + 2, 2].tolist()
-    if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
-        return ""
-    limit_text = f"the maximum level speed according to {envelope.source} is {max_speed:.1f} m/s TAS"
-    return f"{commanded:.1f} m/s TAS is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
-
-
-def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
-    """Return a note if the autopilot does not accept the airspeed set for a leg; otherwise [].
-
-    The note names what sets the airspeed, and states the airspeed that the autopilot flies, within its limits.
+    demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
+    min_speed, max_speed: range of airspeeds in level flight, m/s.
     """
     setup, autopilot = requirements.setup, requirements.setup.autopilot
-    command, limits = float(setup.route.leg_airspeeds[leg]), autopilot.speeds.limits
-    if limits is None or limits.min <= command <= limits.max:
-        return []
-    range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    accepted = float(autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)[leg])
-    flown = min(limits.max, max(limits.min, accepted))
-    source = _airspeed_source(requirements, leg)
-    return [f"{source} {command:g} m/s; {autopilot.title} accepts {range_text}, and flies {flown:g} m/s"]
-
-
-def _airspeed_source(requirements: RouteRequirements, leg: int) -> str:
-    """Return what sets the airspeed of a leg, with its verb: an item, the scenario or an option, or a parameter."""
-    setup, end_item = requirements.setup, int(requirements.setup.route.items[leg + 1])
-    airspeed = float(setup.route.leg_airspeeds[leg])
-    commands = [
-        item.seq
-        for item in setup.mission.items
-        if item.command == Command.DO_CHANGE_SPEED and item.params[:2] == (0.0, airspeed) and item.seq < end_item
-    ]
-    if commands:
-        return f"item {commands[-1]} commands"
-    if airspeed != setup.airspeed:
-        return "the mission commands"
-    if setup.scenario.flight.airspeed_mps is not None:
-        return "the scenario or --airspeed sets"
-    parameter = setup.autopilot.speeds.cruise_parameter
-    return (
-        f"{parameter} is" if setup.autopilot.stated_value(parameter) is not None else "the aircraft's cruise speed is"
-    )
-
-
-def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to reach its airspeed; otherwise [].
-
-    The aircraft is assumed to accelerate at `MAX_STEADY_ACCELERATION_MPS2`.
-    """
+    # The airspeed as it is set, and as true airspeed.
+    setting, commanded = float(setup.route.leg_airspeeds[leg]), float(requirements.route.leg_airspeeds[leg])
+    limits, notes = autopilot.speeds.limits, []
+    if limits is not None and not limits.min <= setting <= limits.max:
+        # The autopilot does not accept the airspeed, which an item, the scenario or an option, or a parameter sets.
+        commands = [
+            item.seq
+            for item in setup.mission.items
+            if item.command == Command.DO_CHANGE_SPEED
+            and item.params[:2] == (0.0, setting)
+            and item.seq < int(setup.route.items[leg + 1])
+        ]
+        parameter = autopilot.speeds.cruise_parameter
+        if commands:
+            source = f"item {commands[-1]} commands"
+        elif setting != setup.airspeed:
+            source = "the mission commands"
+        elif setup.scenario.flight.airspeed_mps is not None:
+            source = "the scenario or --airspeed sets"
+        elif autopilot.stated_value(parameter) is not None:
+            source = f"{parameter} is"
+        else:
+            source = "the aircraft's cruise speed is"
+        range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
+        accepted = float(autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)[leg])
+        flown = min(limits.max, max(limits.min, accepted))
+        notes.append(f"{source} {setting:g} m/s; {autopilot.title} accepts {range_text}, and flies {flown:g} m/s")
+    kind_text = "TAS" if demanded == commanded else f"EAS ({commanded:.1f} m/s TAS)"
+    if math.isfinite(min_speed) and math.isfinite(max_speed):
+        level_text = f"; level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s TAS"
+    else:
+        level_text = ", but no level flight is known"
+    notes.append(f"{demanded:.1f} m/s {kind_text} is commanded{level_text}")
+    # The leg may be too short to reach the airspeed with an acceleration of `MAX_STEADY_ACCELERATION_MPS2`.
     previous_speed = float(requirements.route.leg_airspeeds[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
     duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
     # Distance at the mean of both speeds over ground, in the wind along the leg.
     start_ground_speed = float(requirements.ground_speed[leg]) - change
     needed_length = duration * (start_ground_speed + 0.5 * change)
-    if not needed_length > leg_length or not start_ground_speed > 0.0:
-        return []
-    # Speed after the leg's length at constant acceleration: v² = start_ground_speed² + 2 acceleration leg_length.
-    acceleration = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
-    end_speed = (
-        math.sqrt(max(0.0, start_ground_speed * start_ground_speed + 2.0 * acceleration * leg_length))
-        - start_ground_speed
-        + previous_speed
-    )
-    return [
-        f"the change from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and"
-        f" {needed_length:.0f} m, but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
-    ]
-
-
-def _nearest_mean_airspeed(aligned: AlignedTrack, leg: int, commanded: float) -> float:
-    """Return the one-second mean of a leg's airspeed that is nearest to the commanded airspeed, m/s.
-
-    On a leg shorter than one second, return the mean over the leg.
-    """
-    means = _one_second_means(aligned, aligned.leg_rows(leg))
-    return float(means[np.argmin(np.abs(means - commanded))])
+    if needed_length > leg_length and start_ground_speed > 0.0:
+        # Speed after the leg's length at constant acceleration: v² = start_ground_speed² + 2 acceleration leg_length.
+        acceleration = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
+        squared_end_speed = start_ground_speed * start_ground_speed + 2.0 * acceleration * leg_length
+        end_speed = math.sqrt(max(0.0, squared_end_speed)) - start_ground_speed + previous_speed
+        notes.append(
+            f"the change from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and"
+            f" {needed_length:.0f} m, but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
+        )
+    return notes
 
 
 def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:

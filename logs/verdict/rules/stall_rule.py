@@ -77,7 +77,28 @@ def stall_findings(
     # Without an envelope there is no limit to compare a flight with.
     if aligned is None or not requirements.envelope:
         return []
-    return [finding for finding in planned if finding.ok is False] or _flown_findings(requirements, aligned)
+    if planned and planned[0].ok is False:
+        return planned
+    # The smallest margin in flight.
+    track = aligned.track
+    width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
+    speeds = _window_means(track.airspeed, width)
+    loads = _window_means(track.load_factor, width)
+    banks = _window_means(np.abs(track.attitude[:, ROLL]), width)
+    altitude = _window_means(track.position[:, 2], width)
+    envelope = requirements.setup.envelope
+    level_stall_speeds = np.interp(altitude, envelope.amsl, envelope.level_speed_min)
+    # Larger of the measured load factor and the one that a level turn needs.  An imported log may contain no load
+    # factor.
+    load_factors = np.fmax(loads, 1.0 / np.cos(np.minimum(banks, requirements.limits.max_bank)))
+    stall_speeds = level_stall_speeds * np.sqrt(np.maximum(load_factors, 0.0))
+    margins = speeds - stall_speeds
+    if not np.isfinite(margins).any():
+        return []
+    k = int(np.nanargmin(margins))
+    tolerance = STALL_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
+    margin = _Margin(float(speeds[k]), float(stall_speeds[k]), float(level_stall_speeds[k]), float(banks[k]))
+    return [_stall_finding(margin, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 
 
 def planned_bank(requirements: RouteRequirements, waypoint: int, speed: float) -> float:
@@ -106,29 +127,6 @@ def min_level_airspeed(requirements: RouteRequirements, altitude: float) -> floa
     It is limited by the elevator, which is at its stop at this airspeed.
     """
     return requirements.setup.envelope.level_speeds(altitude)[0]
-
-
-def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
-    """Judge the smallest margin above the stall in a flight; return [] if the margin is never known."""
-    track = aligned.track
-    width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
-    speed = _window_means(track.airspeed, width)
-    load = _window_means(track.load_factor, width)
-    bank = _window_means(np.abs(track.attitude[:, ROLL]), width)
-    altitude = _window_means(track.position[:, 2], width)
-    envelope = requirements.setup.envelope
-    level_stall_speed = np.interp(altitude, envelope.amsl, envelope.level_speed_min)
-    # Larger of the measured load factor and the one that a level turn needs.  An imported log may contain no load
-    # factor.
-    load_factor = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
-    stall_speed = level_stall_speed * np.sqrt(np.maximum(load_factor, 0.0))
-    margins = speed - stall_speed
-    if not np.isfinite(margins).any():
-        return []
-    k = int(np.nanargmin(margins))
-    tolerance = STALL_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
-    worst_margin = _Margin(float(speed[k]), float(stall_speed[k]), float(level_stall_speed[k]), float(bank[k]))
-    return [_stall_finding(worst_margin, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 
 
 def _window_means(values: NDArray[np.floating], width: int) -> Floats:

@@ -267,7 +267,11 @@ def _planned_finding(
         )
         turn_lead = mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
     turn_out = _clip_to_length(turn_lead - lead_out, length)
-    camera_out = _planned_camera_cut(requirements, line, length)
+    # The autopilot switches the camera off where it counts the waypoint as reached.
+    camera_out, off = 0.0, line.camera_off_at
+    if off >= 0:
+        beyond_end = float(requirements.runs[line.last : off].sum()) - float(requirements.runs[off : line.last].sum())
+        camera_out = _clip_to_length(planned_switch_radius(requirements, off) - beyond_end, length)
     cut_out = max(turn_out, camera_out)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     # Fraction of the line whose height above ground is unknown.
@@ -305,18 +309,6 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
     terrain = requirements.setup.scenario.terrain
     source_text = "the terrain data" if terrain is None else f"the data of {terrain.source}"
     return message(f"{name}: {100.0 * fraction:.0f} % of its {length:.0f} m lies outside {source_text}")
-
-
-def _planned_camera_cut(requirements: RouteRequirements, line: PhotoLine, length: float) -> float:
-    """Return the length at the end of a planned photo line on which the camera is already switched off, m.
-
-    The autopilot switches it off where it counts the waypoint as reached.
-    """
-    off = line.camera_off_at
-    if off < 0:
-        return 0.0
-    beyond_end = float(requirements.runs[line.last : off].sum()) - float(requirements.runs[off : line.last].sum())
-    return _clip_to_length(planned_switch_radius(requirements, off) - beyond_end, length)
 
 
 def _clip_to_length(distance: float, length: float) -> float:

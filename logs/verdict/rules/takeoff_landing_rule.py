@@ -19,7 +19,6 @@ from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_gentler_landing
 from logs.verdict.tolerances import LEVEL_SLOPE_RAD, PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
-from world.airfield import Launch
 
 # Verb, by rule, that says which end of a flight is in the air if the phase is not flown.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
@@ -47,9 +46,28 @@ def takeoff_findings(
         return []
     altitude, home = float(requirements.points[waypoint, 2]), mission.home
     has_own_position = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
-    launch = requirements.setup.scenario.launch
-    if launch is not None and (launch_findings := _gentle_launch_findings(requirements, launch)):
-        return launch_findings
+    setup, launch = requirements.setup, requirements.setup.scenario.launch
+    trigger = setup.autopilot.ground.launch_trigger
+    acceleration = math.inf if launch is None else launch.acceleration(setup.default_launch_speed)
+    if trigger is not None and acceleration < trigger[0]:
+        # The launch accelerates the aircraft too little to start the motor.
+        fault = message(gentle_launch_text(acceleration, trigger), ": the motor never starts")
+        return [
+            make_finding(
+                "takeoff",
+                requirements.waypoint(0),
+                ok=False,
+                reason=fault.text,
+                faults=[fault],
+                planned=acceleration,
+                limit=trigger[0],
+                at_least=True,
+                source="autopilot",
+                margin=acceleration - trigger[0],
+                unit="m/s2",
+                method="v²/2L of the scenario's launch",
+            )
+        ]
     if launch is not None and (waypoint == 0 or not has_own_position):
         # The climb leads from the ground at home to the next waypoint, on the launch course.
         next_altitude = float(requirements.points[waypoint + 1, 2])
@@ -66,34 +84,6 @@ def takeoff_findings(
         ]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
-
-
-def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
-    """Return a finding if a launch accelerates the aircraft too little to start the motor, otherwise [].
-
-    An autopilot that starts the motor without such an acceleration has no finding.
-    """
-    setup = requirements.setup
-    trigger, acceleration = setup.autopilot.ground.launch_trigger, launch.acceleration(setup.default_launch_speed)
-    if trigger is None or acceleration >= trigger[0]:
-        return []
-    fault = message(gentle_launch_text(acceleration, trigger), ": the motor never starts")
-    return [
-        make_finding(
-            "takeoff",
-            requirements.waypoint(0),
-            ok=False,
-            reason=fault.text,
-            faults=[fault],
-            planned=acceleration,
-            limit=trigger[0],
-            at_least=True,
-            source="autopilot",
-            margin=acceleration - trigger[0],
-            unit="m/s2",
-            method="v²/2L of the scenario's launch",
-        )
-    ]
 
 
 def landing_findings(
@@ -171,11 +161,14 @@ def _slope_finding(
     text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
     ok: bool | None = True
     check, faults = "", list[Message]()
+    ground_phases = requirements.setup.ground_phases
+    is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     if abs(slope) > limit.limit + PLAN_TOLERANCE_RAD:
         ok = _RESULT_BEYOND_LIMIT[rule]
         check = GROUND_PATH if ok is None else ""
         limit_text = f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
-        limit_text += _flown_text(requirements, rule)
+        if is_flown and rule == "landing":
+            limit_text += " without gaining speed; a flight judges its touchdown instead"
         faults, reason = [message(f"the {_PHASE_TITLES[rule]} {text}", limit_text)], text + limit_text
     elif limit.certain < limit.limit and abs(slope) > max(limit.certain, LEVEL_SLOPE_RAD):
         ok, check, faults = None, _UNCERTAIN_CHECK[rule], [message(f"the {_PHASE_TITLES[rule]} {text}")]
@@ -184,7 +177,8 @@ def _slope_finding(
             f" {limit.airspeed:.1f} m/s, but with its uncertainty only {math.degrees(limit.certain):.1f}° is certain"
         )
     else:
-        reason = f"{text} (at most {limit_deg:.1f}° at {limit.airspeed:.1f} m/s){_not_flown_text(requirements, rule)}"
+        reason = f"{text} (at most {limit_deg:.1f}° at {limit.airspeed:.1f} m/s)"
+        reason += "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
     return make_finding(
         rule,
         waypoint_place,
@@ -200,22 +194,6 @@ def _slope_finding(
         method="mission items",
         check=check,
     )
-
-
-def _not_flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause that says that a take-off or landing is not flown; "" if it is flown."""
-    ground_phases = requirements.setup.ground_phases
-    is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
-    return "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
-
-
-def _flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause that says that a flown landing is judged by its touchdown instead of its slope.
-
-    Return "" for the rule "takeoff", and for a landing that is not flown.
-    """
-    is_flown = rule == "landing" and requirements.setup.ground_phases.approach is not None
-    return " without gaining speed; a flight judges its touchdown instead" if is_flown else ""
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:

@@ -62,13 +62,9 @@ def threat_findings(
             ):
                 visit = None if geometric else _sphere_visit(flown_visits, number)
                 place = Place(kind, number, name=threat.name or "")
-                nearest_place = (
-                    "" if kind == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[number]))
-                )
+                planned_visit = _sphere_visit(planned_visits, number)
                 findings.append(
-                    _sphere_finding(
-                        place, _sphere_visit(planned_visits, number), visit, float(radii[number]), nearest_place
-                    )
+                    _sphere_finding(requirements, aligned, place, planned_visit, visit, float(radii[number]))
                 )
     if all(finding.ok for finding in findings if finding.place.kind == "missile"):
         navigation_error = position_error(requirements.setup)
@@ -103,23 +99,6 @@ def _sphere_visit(visits: SphereVisits | None, threat: int) -> _Visit:
         return _Visit()
     columns = (visits.time_inside, visits.exposure, visits.closest, visits.closest_time)
     return _Visit(*(float(column[threat]) for column in columns))
-
-
-def _nearest_place_text(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
-) -> str:
-    """Describe the leg and the position where the flight was nearest to a sphere's center.
-
-    Return "" if the flight never entered the sphere.
-
-    radius: radius of the sphere, m.
-    """
-    if aligned is None or visit is None or math.isnan(visit.closest_time) or visit.closest > radius:
-        return ""
-    time = aligned.track.time
-    k = max(0, min(len(time) - 2, int(np.searchsorted(time, visit.closest_time, side="right")) - 1))
-    fraction = float((visit.closest_time - time[k]) / (time[k + 1] - time[k]))
-    return f" on {place_text(requirements.leg(aligned.leg_at(k)))} {aligned.position_text(k, fraction)}"
 
 
 def _no_entry_finding(
@@ -169,13 +148,17 @@ def _no_entry_finding(
 
 
 def _sphere_finding(
-    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, nearest_place: str
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    place: Place,
+    planned_visit: _Visit,
+    flown_visit: _Visit | None,
+    radius: float,
 ) -> Finding:
     """Make the finding on a sphere.  An entered missile sphere fails; a radar sphere always passes.
 
     flown_visit: visit of the flown track; None before a flight, and the planned visit is then judged.
     radius: radius of the sphere, m.
-    nearest_place: text on the leg and position nearest to the center, or "".
     """
     judged_visit = planned_visit if flown_visit is None else flown_visit
     is_missing = math.isnan(judged_visit.closest)
@@ -190,7 +173,14 @@ def _sphere_finding(
             f" (weighted by distance: {flown_visit.exposure:.3g} s)."
             f" It came within {flown_visit.closest:.0f} m of the missile site or radar"
         )
-        facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
+        facts += f" at {flown_visit.closest_time:.1f} s"
+        is_entered = place.kind == "missile" and flown_visit.closest <= radius
+        if is_entered and aligned is not None and not math.isnan(flown_visit.closest_time):
+            time = aligned.track.time
+            k = max(0, min(len(time) - 2, int(np.searchsorted(time, flown_visit.closest_time, side="right")) - 1))
+            fraction = float((flown_visit.closest_time - time[k]) / (time[k + 1] - time[k]))
+            leg = requirements.leg(aligned.leg_at(k))
+            facts += f" on {place_text(leg)} {aligned.position_text(k, fraction)}"
     flown_time = None if flown_visit is None else flown_visit.time_inside
     if place.kind == "radar":
         return make_finding(

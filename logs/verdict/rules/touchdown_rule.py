@@ -70,11 +70,12 @@ def touchdown_findings(
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
         planned_approach = requirements.setup.ground_phases.approach if geometric else None
-        return (
-            []
-            if planned_approach is None
-            else _short_strip_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
-        )
+        faults = [] if planned_approach is None else _short_strip_messages(planned_approach)
+        if planned_approach is None or not faults:
+            return []
+        place = requirements.waypoint(planned_approach.leg + 1)
+        reason = finding_reason(faults)
+        return [make_finding("touchdown", place, ok=None, reason=reason, faults=faults, check=GROUND_PATH)]
     approach = ground_phases.procedures.approach
     place = ground_phases.whole_route.waypoint(approach.leg + 1)
     track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
@@ -114,17 +115,6 @@ def touchdown_findings(
     return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]
 
 
-def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
-    """Return an undecided finding if the strip is too short to judge the touchdown, otherwise []."""
-    messages = _short_strip_messages(approach)
-    reason = finding_reason(messages)
-    return (
-        [make_finding("touchdown", place, ok=None, reason=reason, faults=messages, check=GROUND_PATH)]
-        if messages
-        else []
-    )
-
-
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
@@ -136,7 +126,14 @@ def _measure_landing(
     position = np.asarray(track.position, dtype=np.float64)
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
     touchdown, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
-    sink, ground_sink = _sink_rates(track, terrain, approach, touchdown_row)
+    # Sink rates just before touchdown: vertical, and relative to the sloping ground.
+    sink_row = max(0, touchdown_row - 2)
+    east_speed, north_speed, vertical_speed = (float(value) for value in track.velocity[sink_row])
+    half_base = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
+    east_north = position[sink_row, :2]
+    height_change = float(terrain.height(*(east_north + half_base)) - terrain.height(*(east_north - half_base)))
+    course_speed = east_speed * math.sin(approach.course) + north_speed * math.cos(approach.course)
+    ground_sink = -vertical_speed + height_change / _SLOPE_RUN_M * course_speed
     point_altitude = float(approach.point[2])
     glide = requirements.setup.autopilot.ground.glide(
         approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
@@ -154,7 +151,7 @@ def _measure_landing(
         touchdown=touchdown,
         stop=stop,
         strip_left=0.5 * approach.strip.length - stop[0],
-        sink=sink,
+        sink=-vertical_speed,
         ground_sink=ground_sink,
         final_clearance=final_clearance,
     )
@@ -172,13 +169,26 @@ def _landing_finding(
     if not faults and not undecided_messages and math.isnan(landing.final_clearance):
         undecided_messages = [message("the terrain below the final approach is unknown")]
     messages = faults or undecided_messages
+    direction = "before" if landing.distance_beyond_point < 0.0 else "beyond"
+    left = landing.strip_left
+    facts = [
+        f"touches down {abs(landing.distance_beyond_point):.0f} m {direction} the landing point, "
+        f"{abs(landing.lateral_offset):.1f} m to the side",
+        f"comes to rest with {left:.0f} m of the strip left" if left >= 0.0 else f"overruns the strip by {-left:.0f} m",
+        f"sinks at {landing.sink:.1f} m/s at touchdown, {landing.ground_sink:.1f} m/s relative to the sloping ground;"
+        " the flare itself is not judged",
+    ]
+    if math.isfinite(landing.final_clearance):
+        facts.append(f"the final approach stays at least {landing.final_clearance:.0f} m above ground")
+    if approach.tail_wind > 0.1:
+        facts.append(f"with {approach.tail_wind:.1f} m/s of tailwind")
     limit = 0.5 * approach.strip.length - TOUCHDOWN_ERROR_M
     max_distance = max(landing.stop[0], abs(landing.touchdown[0]))
     return make_finding(
         "touchdown",
         place,
         ok=False if faults else None if undecided_messages else True,
-        reason=finding_reason(messages, _describe_landing(approach, landing)),
+        reason=finding_reason(messages, facts),
         faults=messages,
         flown=max_distance,
         limit=limit,
@@ -207,19 +217,6 @@ def _landing_point_text(approach: Approach) -> str:
 def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
     """Convert two arrays of one element each to floats."""
     return float(values[0]), float(values[1])
-
-
-def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) -> tuple[float, float]:
-    """Return the sink rate just before touchdown, and the sink rate relative to the sloping ground, m/s."""
-    row = max(0, row - 2)
-    east, north, vertical_speed = (float(value) for value in track.velocity[row])
-    position = np.asarray(track.position[row, :2], dtype=np.float64)
-    half_base = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
-    ground_slope = (
-        float(terrain.height(*(position + half_base)) - terrain.height(*(position - half_base))) / _SLOPE_RUN_M
-    )
-    course_speed = east * math.sin(approach.course) + north * math.cos(approach.course)
-    return -vertical_speed, -vertical_speed + ground_slope * course_speed
 
 
 def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
@@ -288,28 +285,6 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
             message(brief, f"; ArduPlane's known landings touch down at up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s")
         )
     return messages
-
-
-def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
-    """Describe a landing in phrases: touchdown, remaining strip, sink rate, final approach, tailwind."""
-    direction = "before" if landing.distance_beyond_point < 0.0 else "beyond"
-    notes = [
-        f"touches down {abs(landing.distance_beyond_point):.0f} m {direction} the landing point, "
-        f"{abs(landing.lateral_offset):.1f} m to the side"
-    ]
-    left = landing.strip_left
-    notes.append(
-        f"comes to rest with {left:.0f} m of the strip left" if left >= 0.0 else f"overruns the strip by {-left:.0f} m"
-    )
-    sink_text = (
-        f"sinks at {landing.sink:.1f} m/s at touchdown, {landing.ground_sink:.1f} m/s relative to the sloping ground"
-    )
-    notes.append(f"{sink_text}; the flare itself is not judged")
-    if math.isfinite(landing.final_clearance):
-        notes.append(f"the final approach stays at least {landing.final_clearance:.0f} m above ground")
-    if approach.tail_wind > 0.1:
-        notes.append(f"with {approach.tail_wind:.1f} m/s of tailwind")
-    return notes
 
 
 RULE = Rule(

@@ -66,7 +66,16 @@ def _turn_finding(
     faults, facts, check, judged_turn = _judge_planned_turn(requirements, waypoint, limit, source)
     # With a known aircraft, the planned turn is compared with its limits, and the flown turn is only described.
     is_judged_as_planned = measure is None or bool(requirements.envelope)
-    facts += _fly_over_notes(requirements, waypoint, planned_turn)
+    radius, route = float(requirements.radius[waypoint]), requirements.setup.route
+    acceptance_radius = float(route.points["acceptance_radius"][waypoint])
+    if route.fly_over[waypoint] and acceptance_radius and math.isfinite(radius):
+        offset = fly_by_offset(planned_turn, radius)
+        if offset > acceptance_radius:
+            lateral = radius * (1.0 - math.cos(planned_turn))
+            facts.append(
+                f"flown over, because a fly-by arc would pass {offset:.0f} m away, outside the acceptance radius of"
+                f" {acceptance_radius:.0f} m; after the waypoint the turn swings up to {lateral:.0f} m off the next leg"
+            )
     angle = None if measure is None else measure.angle
     tolerance = PLAN_TOLERANCE_RAD
     if measure is not None:
@@ -81,10 +90,18 @@ def _turn_finding(
     if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, waypoint, measure, aligned))
         ok = None if ok is not False else False
-    method = "route"
+    method, measured_facts = "route", []
     if measure is not None:
         fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
         method = "not flown" if measure.angle is None else fit_text
+        quantities = (
+            ("overshoot", measure.overshoot, "m"),
+            ("settled", measure.settled_distance if measure.is_complete else None, "m"),
+            ("bank", None if measure.held_bank is None else math.degrees(measure.held_bank), "deg"),
+            ("radius", measure.radius, "m"),
+            ("nearest pass", None if measure.corner is None else measure.corner.distance, "m"),
+        )
+        measured_facts = [Fact(quantity, value, unit) for quantity, value, unit in quantities if value is not None]
     return make_finding(
         "turn",
         requirements.waypoint(waypoint),
@@ -100,7 +117,7 @@ def _turn_finding(
         unit="deg",
         method=method,
         check=check if ok is None else "",
-        facts=_measured_facts(measure),
+        facts=measured_facts,
     )
 
 
@@ -121,8 +138,33 @@ def _judge_planned_turn(
     if lateral is not None:
         facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
         return [], facts, "", None
-    # The message states the turn and its limit.
-    sharp_turn = _sharp_turn_message(requirements, waypoint, turn, limit, source)
+    # The message states the turn and the scenario's limit, or the length of leg that the turn needs.
+    speed = float(max(requirements.route.leg_airspeeds[waypoint - 1 : waypoint + 1]))
+    radius, bank_text = float(requirements.radius[waypoint]), bank_limit_text(requirements.setup)
+    if source == "scenario":
+        sharp_turn = message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
+    elif not math.isfinite(radius):
+        sharp_turn = message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
+    elif requirements.setup.route.arc_radii[waypoint] > 0.0:
+        sharp_turn = message(
+            f"circles with radius {radius:.0f} m",
+            f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
+            f" in this wind is {requirements.min_radius[waypoint]:.0f} m",
+        )
+    else:
+        used_length = float(requirements.length_after[waypoint])
+        length_text = "no leg would be long enough for the turn"
+        if used_length < MAX_FLY_BY_OFFSET_RADII * radius:
+            is_fly_over = requirements.setup.route.fly_over[waypoint]
+            used_text = "the next leg, after the waypoint" if is_fly_over else "each leg"
+            length_text = f"the turn takes {used_length:.0f} m of {used_text}"
+        room_text = f"room for only {math.degrees(limit):.1f}°" if limit > 0.0 else "no room"
+        sharp_turn = message(
+            f"{turn_text}, but its legs ({requirements.runs[waypoint - 1]:.0f} m and {requirements.runs[waypoint]:.0f}"
+            f" m) leave {room_text}",
+            f" beside the neighbouring turns. At {speed:.0f} m/s and {bank_text} the radius is {radius:.0f} m, and"
+            f" {length_text}",
+        )
     # The aircraft's bank limit may be a guess.
     if source == "aircraft" and turn <= float(requirements.possible_turn_limit[waypoint]) + PLAN_TOLERANCE_RAD:
         return [], [sharp_turn.text], UNKNOWN_AIRCRAFT, turn
@@ -153,69 +195,6 @@ def _unflown_turn_text(
     )
 
 
-def _fly_over_notes(requirements: RouteRequirements, waypoint: int, turn: float) -> list[str]:
-    """Return a note if a fly-by arc would miss the acceptance radius; otherwise [].
-
-    The waypoint is then flown over.
-    turn: course change, rad.
-    """
-    radius = float(requirements.radius[waypoint])
-    acceptance = float(requirements.setup.route.points["acceptance_radius"][waypoint])
-    if not requirements.setup.route.fly_over[waypoint] or not acceptance or not math.isfinite(radius):
-        return []
-    offset = fly_by_offset(turn, radius)
-    if offset <= acceptance:
-        return []
-    lateral = radius * (1.0 - math.cos(turn))
-    return [
-        f"flown over, because a fly-by arc would pass {offset:.0f} m away, outside the acceptance radius of"
-        f" {acceptance:.0f} m; after the waypoint the turn swings up to {lateral:.0f} m off the next leg"
-    ]
-
-
-def _sharp_turn_message(
-    requirements: RouteRequirements, waypoint: int, planned_turn: float, limit: float, source: str
-) -> Message:
-    """Explain why the planned turn at a waypoint is too sharp.
-
-    The message states the scenario's limit, or the length of leg that the turn needs.  All angles are in rad.
-
-    limit: largest allowed turn at the waypoint.
-    source: where the limit comes from, "scenario" or "aircraft".
-    """
-    turn_text = f"turns {math.degrees(planned_turn):.1f}°"
-    if source == "scenario":
-        return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
-    speed = float(max(requirements.route.leg_airspeeds[waypoint - 1 : waypoint + 1]))
-    bank_text = bank_limit_text(requirements.setup)
-    radius = float(requirements.radius[waypoint])
-    if not math.isfinite(radius):
-        return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
-    if requirements.setup.route.arc_radii[waypoint] > 0.0:
-        return message(
-            f"circles with radius {radius:.0f} m",
-            f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
-            f" in this wind is {requirements.min_radius[waypoint]:.0f} m",
-        )
-    length_text = "no leg would be long enough for the turn"
-    if requirements.length_after[waypoint] < MAX_FLY_BY_OFFSET_RADII * radius:
-        length_text = f"the turn takes {requirements.length_after[waypoint]:.0f} m of each leg"
-        if requirements.setup.route.fly_over[waypoint]:
-            length_text = (
-                f"the turn takes {requirements.length_after[waypoint]:.0f} m of the next leg, after the waypoint"
-            )
-    length_before, length_after = requirements.runs[waypoint - 1], requirements.runs[waypoint]
-    legs_text = f"its legs ({length_before:.0f} m and {length_after:.0f} m)"
-    room_text = (
-        f"{legs_text} leave room for only {math.degrees(limit):.1f}°" if limit > 0.0 else f"{legs_text} leave no room"
-    )
-    return message(
-        f"{turn_text}, but {room_text}",
-        f" beside the neighbouring turns. At {speed:.0f} m/s and {bank_text} the radius is {radius:.0f} m, and"
-        f" {length_text}",
-    )
-
-
 def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> list[tuple[str, str]]:
     """Describe a flown turn, as pairs of a measured quantity's name and a text."""
     facts = []
@@ -238,21 +217,6 @@ def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMe
     return facts
 
 
-def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
-    """Return the known measurements of a flown turn as facts; [] before a flight."""
-    if measure is None:
-        return []
-    bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
-    numbers = (
-        ("overshoot", measure.overshoot, "m"),
-        ("settled", measure.settled_distance if measure.is_complete else None, "m"),
-        ("bank", bank, "deg"),
-        ("radius", measure.radius, "m"),
-        ("nearest pass", None if measure.corner is None else measure.corner.distance, "m"),
-    )
-    return [Fact(quantity, value, unit) for quantity, value, unit in numbers if value is not None]
-
-
 def _flown_faults(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
 ) -> dict[str, Message]:
@@ -260,7 +224,7 @@ def _flown_faults(
 
     limit: largest course change, rad.
     """
-    faults = {}
+    faults, setup = {}, requirements.setup
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown_angle, max_angle = math.degrees(measure.angle), math.degrees(limit)
         faults["course change"] = message(
@@ -272,47 +236,35 @@ def _flown_faults(
         faults["bank"] = message(
             f"bank {math.degrees(measure.held_bank):.1f}°, more than the limit of {math.degrees(max_bank):.1f}°"
         )
-    if (tight_turn := _tight_turn_fault(requirements, waypoint, measure)) is not None:
-        faults["radius"] = tight_turn
-    if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
-        passed_text = "its arc" if measure.corner is None else "its next leg"
-        faults["overshoot"] = message(
-            f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
-        )
-    max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
-    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
-        offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
-        faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
-    if measure.full_circles:
-        faults["circles"] = message(f"{count_text(measure.full_circles, 'full circle')} flown at the corner")
-    return faults
-
-
-def _tight_turn_fault(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> Message | None:
-    """Return a fault if a turn was tighter than an arc at the bank limit, otherwise None.
-
-    The arc between legs that are too short for their turn is tighter than the bank limit permits.  A flight along this
-    arc exceeded the bank limit or slowed down.
-    """
-    turn, setup = abs(float(requirements.turns[waypoint])), requirements.setup
-    min_radius = float(requirements.min_radius[waypoint])
+    # A flight along the arc between legs that are too short for their turn exceeded the bank limit or slowed down.
+    turn, min_radius = abs(float(requirements.turns[waypoint])), float(requirements.min_radius[waypoint])
     # planfly's guidance also has no arc to follow at a sharper corner with short legs.
     min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not keep to the arc may pass the waypoint at any distance.
     follows_arc = (
         setup.autopilot.turns.keeps_to_arcs and setup.imported_log is None and not setup.route.fly_over[waypoint]
     )
-    if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
-        return None
-    tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
-    tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
-    if measure.min_distance >= min_distance - tolerance:
-        return None
-    return message(
-        f"passes its waypoint {measure.min_distance:.1f} m away, closer than the bank limit permits",
-        f"; an arc at {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind (radius {min_radius:.0f}"
-        f" m) passes the waypoint {min_distance:.1f} m away",
-    )
+    if measure.min_distance is not None and math.isfinite(min_distance) and follows_arc:
+        tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
+        tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
+        if measure.min_distance < min_distance - tolerance:
+            faults["radius"] = message(
+                f"passes its waypoint {measure.min_distance:.1f} m away, closer than the bank limit permits",
+                f"; an arc at {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind (radius"
+                f" {min_radius:.0f} m) passes the waypoint {min_distance:.1f} m away",
+            )
+    if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
+        passed_text = "its arc" if measure.corner is None else "its next leg"
+        faults["overshoot"] = message(
+            f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
+        )
+    max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[setup.scenario.wind.turbulence]
+    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
+        offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
+        faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
+    if measure.full_circles:
+        faults["circles"] = message(f"{count_text(measure.full_circles, 'full circle')} flown at the corner")
+    return faults
 
 
 RULE = Rule(

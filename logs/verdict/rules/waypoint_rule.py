@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import AcceptanceCondition, acceptance_condition
+from logs.verdict.measures.acceptance import acceptance_condition
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
@@ -42,10 +42,20 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
     condition = acceptance_condition(requirements, waypoint)
     offset = float(requirements.fly_by_offset[waypoint])
     faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
+    autopilot = requirements.setup.autopilot
     if requirements.setup.route.fly_over[waypoint]:
         fact = "flown over"
-    elif not requirements.setup.autopilot.turns.follows_path:
-        fact = _turn_text(requirements, waypoint, condition)
+    elif not autopilot.turns.follows_path:
+        # Without fly-by arcs, the autopilot turns at a distance before the waypoint.
+        turn_distance, unread_text = condition.radius, ""
+        if condition.source == "mission" and not autopilot.turns.reads_acceptance:
+            turn = abs(float(requirements.turns[waypoint])) if 0 < waypoint < requirements.legs else math.pi
+            turn_distance = autopilot.turns.distance(turn, float(requirements.points[waypoint, 2]))
+            unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
+        fact = (
+            f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before the waypoint, or once the aircraft"
+            f" has passed the waypoint{unread_text}"
+        )
     elif offset > condition.radius + ROUNDING_M:
         turn = math.degrees(abs(float(requirements.turns[waypoint])))
         radius = float(requirements.radius[waypoint])
@@ -62,25 +72,12 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         reason=finding_reason(faults) if faults else fact,
         faults=faults,
         planned=offset,
-        limit=condition.radius,
+        limit=round(condition.radius, 3),
         source=condition.source,
         tolerance=ROUNDING_M,
-        margin=condition.radius - offset if requirements.setup.autopilot.turns.follows_path else None,
+        margin=condition.radius - offset if autopilot.turns.follows_path else None,
         unit="m",
         method="the fly-by arc",
-    )
-
-
-def _turn_text(requirements: RouteRequirements, waypoint: int, condition: AcceptanceCondition) -> str:
-    """Describe where an autopilot without fly-by arcs turns at a waypoint."""
-    autopilot, turn_distance, unread_text = requirements.setup.autopilot, condition.radius, ""
-    if condition.source == "mission" and not autopilot.turns.reads_acceptance:
-        turn = abs(float(requirements.turns[waypoint])) if 0 < waypoint < requirements.legs else math.pi
-        turn_distance = autopilot.turns.distance(turn, float(requirements.points[waypoint, 2]))
-        unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
-    return (
-        f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before the waypoint, or once the aircraft has"
-        f" passed the waypoint{unread_text}"
     )
 
 
@@ -103,9 +100,16 @@ def _flown_finding(
         distance, height_error = _closest_approach(requirements, aligned, waypoint, float(apexes[waypoint, 2]))
         facts = (Fact("height error", height_error, "m"),)
         ok = distance <= max_distance
-        crossing_offset = (
-            math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, waypoint)
-        )
+        crossing_offset = math.inf
+        if not ok and not setup.autopilot.turns.follows_path and waypoint > 0:
+            # The track may have crossed the line that runs through the waypoint, across the leg.
+            is_last = waypoint + 1 == len(requirements.points)
+            last = len(aligned.track) - 1 if is_last else int(aligned.rows[waypoint + 1])
+            distances_along, lateral_offsets = project_onto_leg(
+                requirements, waypoint - 1, aligned.track.position[int(aligned.rows[waypoint - 1]) : last + 1]
+            )
+            rows_past = np.flatnonzero(distances_along >= requirements.runs[waypoint - 1])
+            crossing_offset = abs(float(lateral_offsets[rows_past[0]])) if rows_past.size else math.inf
         if crossing_offset <= setup.corridor:
             ok = True
         side = "above" if height_error >= 0.0 else "below"
@@ -124,7 +128,13 @@ def _flown_finding(
                 distance, ok, facts = math.nan, None, ()
                 reason = f"not reached: the flight ended on {place_text(last_leg)}"
         elif not ok:
-            reason = f"missed: {reason}; {_acceptance_text(condition)}"
+            owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
+                condition.source, "the fly-by path's"
+            )
+            purpose = RULE_WORDS["waypoint"].tolerance_purpose
+            error_text = f" plus {condition.tolerance:.1f} m for {purpose}" if condition.tolerance else ""
+            condition_text = f"the waypoint counts as reached within {condition.radius:.0f} m ({owner} radius)"
+            reason = f"missed: {reason}; {condition_text}{error_text}"
     return make_finding(
         "waypoint",
         requirements.waypoint(waypoint),
@@ -133,7 +143,7 @@ def _flown_finding(
         faults=faults,
         planned=offset,
         flown=distance,
-        limit=condition.radius,
+        limit=round(condition.radius, 3),
         source=condition.source,
         tolerance=condition.tolerance,
         # A waypoint reached by crossing its line has no margin, nor does one that was not reached.
@@ -142,32 +152,6 @@ def _flown_finding(
         method="closest approach, horizontal",
         facts=facts,
     )
-
-
-def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> float:
-    """Return the distance from a waypoint at which the track first crossed the end line of the leg, m.
-
-    The end line runs through the waypoint, across the leg.  Return inf if the track did not cross it, or for the first
-    waypoint.
-    """
-    if waypoint == 0:
-        return math.inf
-    last = int(aligned.rows[waypoint + 1]) if waypoint + 1 < len(requirements.points) else len(aligned.track) - 1
-    distances_along, lateral_offsets = project_onto_leg(
-        requirements, waypoint - 1, aligned.track.position[int(aligned.rows[waypoint - 1]) : last + 1]
-    )
-    rows_past = np.flatnonzero(distances_along >= requirements.runs[waypoint - 1])
-    return abs(float(lateral_offsets[rows_past[0]])) if rows_past.size else math.inf
-
-
-def _acceptance_text(condition: AcceptanceCondition) -> str:
-    """Describe the acceptance radius of a waypoint, its source and its tolerance."""
-    radius_owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
-        condition.source, "the fly-by path's"
-    )
-    purpose = RULE_WORDS["waypoint"].tolerance_purpose
-    error_text = f" plus {condition.tolerance:.1f} m for {purpose}" if condition.tolerance else ""
-    return f"the waypoint counts as reached within {condition.radius:.0f} m ({radius_owner} radius){error_text}"
 
 
 def _closest_approach(

@@ -180,9 +180,22 @@ def px4_log_bytes(log: FlightLog) -> bytes:
         head += _encode_message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
     stamps, messages = [], []
     for number, topic in enumerate(topics):
-        times, records = _encode_topic(number, topic)
-        stamps += times
-        messages += records
+        # Data messages of the topic, at the topic's interval.
+        topic_stamps = topic.values["timestamp"]
+        recorded_rows = np.arange(len(topic_stamps))
+        if topic.period:
+            slots = np.floor(topic_stamps * 1e-6 / topic.period + 1e-9)
+            recorded_rows = np.flatnonzero(np.diff(slots, prepend=-1.0) > 0.0)
+        shapes = [(name, kind, *([(shape[0],)] if shape else [])) for name, kind, *shape in topic.fields]
+        body_type = np.dtype([("timestamp", "<u8"), *shapes])
+        message_type = np.dtype([("size", "<u2"), ("letter", "S1"), ("number", "<u2"), ("body", body_type)])
+        records = np.zeros(len(recorded_rows), message_type)
+        records["size"], records["letter"], records["number"] = body_type.itemsize + 2, b"D", number
+        for field in body_type.names or ():
+            records["body"][field] = topic.values[field][recorded_rows]
+        data, size = records.tobytes(), message_type.itemsize
+        stamps += topic_stamps[recorded_rows].tolist()
+        messages += [data[start : start + size] for start in range(0, len(data), size)]
     for event in log.events:
         stamp = round(event.time * 1e6)
         body = _LEVELS.get(event.level, b"6") + struct.pack("<Q", stamp) + event.text.encode()
@@ -195,29 +208,6 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 def _encode_message(letter: bytes, body: bytes) -> bytes:
     """Encode one message of a ULog file: its length, the letter of its kind, and its content."""
     return struct.pack("<H", len(body)) + letter + body
-
-
-def _encode_topic(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
-    """Return the timestamps (us) and the encoded data messages of a topic, at the topic's interval.
-
-    number: number of the topic in the log.
-    """
-    stamps = topic.values["timestamp"]
-    if topic.period:
-        slots = np.floor(stamps * 1e-6 / topic.period + 1e-9)
-        recorded_rows = np.flatnonzero(np.diff(slots, prepend=-1.0) > 0.0)
-    else:
-        recorded_rows = np.arange(len(stamps))
-    shapes = [(name, kind, *([(shape[0],)] if shape else [])) for name, kind, *shape in topic.fields]
-    body = np.dtype([("timestamp", "<u8"), *shapes])
-    record = np.zeros(
-        len(recorded_rows), np.dtype([("size", "<u2"), ("letter", "S1"), ("number", "<u2"), ("body", body)])
-    )
-    record["size"], record["letter"], record["number"] = body.itemsize + 2, b"D", number
-    for name in body.names or ():
-        record["body"][name] = topic.values[name][recorded_rows]
-    data, size = record.tobytes(), record.dtype.itemsize
-    return stamps[recorded_rows].tolist(), [data[start : start + size] for start in range(0, len(data), size)]
 
 
 # Flags of vehicle_local_position.

@@ -5,6 +5,7 @@ microseconds since 1970 in eight bytes, big-endian.  The live vehicle sends the 
 clock of the log begins with the year 2000.
 """
 
+import itertools
 import struct
 from collections.abc import Iterator
 from typing import Any
@@ -53,32 +54,22 @@ def telemetry_bytes(log: FlightLog) -> bytes:
     >>> struct.unpack(">Q", data[:8])[0] == EPOCH_NS // 1000, data[8] == 0xFD  # the first frame is of MAVLink 2
     (True, True)
     """
-    senders = {sender_ids: mavlink.MAVLink(None, *sender_ids) for sender_ids in (_VEHICLE, _STATION)}
+    items, _, _ = mission_lists(log.setup.mission)
+    upload_messages = [
+        # No base mode, no custom mode, state ACTIVE (4), MAVLink version 3.
+        mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3),
+        # Target system and component 1, number of items, mission type 0 (the mission itself).
+        mavlink.MAVLink_mission_count_message(1, 1, len(items), 0),
+        *map(to_message, items),
+    ]
+    station, vehicle = mavlink.MAVLink(None, *_STATION), mavlink.MAVLink(None, *_VEHICLE)
+    station_frames = ((0.0, station, message) for message in upload_messages)
+    vehicle_frames = ((time, vehicle, message) for time, message in _make_flight_messages(log))
     data = bytearray()
-    for time, sender_ids, message in _list_timed_messages(log):
-        sender = senders[sender_ids]
+    for time, sender, message in itertools.chain(station_frames, vehicle_frames):
         data += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
         sender.seq = (sender.seq + 1) % 256
     return bytes(data)
-
-
-def _list_timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
-    """Yield the time in flight (s), the sender and the message of each frame, in order of time."""
-    for message in _make_upload_messages(log):
-        yield 0.0, _STATION, message
-    for time, message in _make_flight_messages(log):
-        yield time, _VEHICLE, message
-
-
-def _make_upload_messages(log: FlightLog) -> Iterator[Any]:
-    """Yield the messages with which a ground station uploads the mission."""
-    items, _, _ = mission_lists(log.setup.mission)
-    # No base mode, no custom mode, state ACTIVE (4), MAVLink version 3.
-    yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
-    # Target system and component 1, number of items, mission type 0 (the mission itself).
-    yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
-    for item in items:
-        yield to_message(item)
 
 
 def _make_flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:

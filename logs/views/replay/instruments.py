@@ -63,18 +63,33 @@ class Instruments:
         width: largest number of columns of a line; at least `MIN_WIDTH` are used.
         """
         columns = max(MIN_WIDTH, width)
-        log = self.log
-        k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
+        log, track = self.log, self.log.track
+        k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
         size = _WIDE if columns >= _WIDE.columns else _NARROW
         horizon_lines, readout_lines = self._draw_horizon(k, size.horizon), self._format_readouts(k)
         rows = max(len(horizon_lines), len(readout_lines))
         horizon_lines += [" " * (size.horizon + 2)] * (rows - len(horizon_lines))
         readout_lines += [""] * (rows - len(readout_lines))
-        lines = self._format_head_lines(k, columns)
+        # The title with the time, a bar of the time flown, and the leg with the remaining distance.
+        row_time, start_time = float(track.time[k]), float(track.time[0])
+        title = _replace_control_characters(f"{log.setup.scenario.name}: {log.setup.aircraft}")
+        clock = f"{row_time:8.1f} of {log.end_time:.1f} s"
+        title_width = max(1, columns - len(clock))
+        filled_columns = round((columns - 2) * (row_time - start_time) / max(log.end_time - start_time, 1e-9))
+        bar = "[" + "=" * filled_columns + " " * (columns - 2 - filled_columns) + "]"
+        leg, route, position = int(track.leg[k]), log.setup.route, track.position[k]
+        leg_text = "after the last waypoint"
+        if leg < route.legs:
+            distance = float(np.hypot(*(route.positions[leg + 1, :2] - position[:2])))
+            leg_text = (
+                f"leg {route.leg_numbers[leg]} of {route.leg_numbers[-1] + 1}, to {waypoint_name(route, leg + 1)},"
+                f" {_format_metres(distance)} to go"
+            )
+        lines = [title[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
         lines += [
             f"{left_line}  {right_line}" for left_line, right_line in zip(horizon_lines, readout_lines, strict=True)
         ]
-        threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
+        threats = log.setup.scenario.threats
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         threats_in_reach = [
             f"{unit} {threats.names[m]} at {_format_metres(float(distances[m]))}"
@@ -84,7 +99,7 @@ class Instruments:
         threats_text = _replace_control_characters(
             "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "outside the reach of all units"
         )
-        entry_count = bisect.bisect_right([entry.time for entry in self.entries], float(log.track.time[k]) + 1e-9)
+        entry_count = bisect.bisect_right([entry.time for entry in self.entries], row_time + 1e-9)
         latest_lines = [
             f"{entry.time:8.1f} s  {entry.text}"
             for entry in self.entries[max(0, entry_count - _LATEST_ENTRIES) : entry_count]
@@ -96,26 +111,6 @@ class Instruments:
             *latest_lines,
         ]
         return [shorten(line, columns).rstrip() for line in lines]
-
-    def _format_head_lines(self, row: int, columns: int) -> list[str]:
-        """Return the title with the time, a bar of the time flown, and the leg with the remaining distance."""
-        log, track = self.log, self.log.track
-        time, end = float(track.time[row]), log.end_time
-        title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
-        clock = f"{time:8.1f} of {end:.1f} s"
-        filled_columns = round((columns - 2) * (time - float(track.time[0])) / max(end - float(track.time[0]), 1e-9))
-        bar = "[" + "=" * filled_columns + " " * (columns - 2 - filled_columns) + "]"
-        leg = int(track.leg[row])
-        route = log.setup.route
-        step = route.positions[leg + 1, :2] - track.position[row, :2] if leg < route.legs else np.zeros(2)
-        leg_text = (
-            f"leg {route.leg_numbers[leg]} of {route.leg_numbers[-1] + 1}, to {waypoint_name(route, leg + 1)},"
-            f" {_format_metres(float(np.hypot(*step)))} to go"
-        )
-        if leg >= route.legs:
-            leg_text = "after the last waypoint"
-        title_width = max(1, columns - len(clock))
-        return [_replace_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
 
     def _draw_horizon(self, track_row: int, columns: int) -> list[str]:
         """Return the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""

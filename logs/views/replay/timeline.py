@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.route import Route
-from flight.simulation.track import Track
+from flight.simulation.track import THROTTLE
 from logs.recording.reader import FlightLog
-from logs.verdict.measures.path_sweeps import Passage, passages, segment_clearances
+from logs.verdict.measures.path_sweeps import passages, segment_clearances
 from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
@@ -89,12 +89,33 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     entries += _list_turn_entries(log, parts)
     entries += _list_clearance_entries(log, parts)
     entries += _list_threat_entries(log)
-    entries += _list_throttle_entries(log.track)
+    # Periods in which the throttle is full or closed.
+    throttle = track.commands[:, THROTTLE]
+    for name, is_held in (
+        ("full", throttle >= 1.0 - _THROTTLE_LIMIT_TOLERANCE),
+        ("closed", throttle <= _THROTTLE_LIMIT_TOLERANCE),
+    ):
+        padded = np.concatenate([[False], is_held, [False]])
+        period_edges = np.flatnonzero(padded[1:] != padded[:-1])
+        for first, end in zip(period_edges[::2].tolist(), period_edges[1::2].tolist(), strict=True):
+            start_time = float(track.time[first])
+            # A command holds until the next row.
+            duration = float(track.time[min(end, len(track) - 1)]) - start_time
+            if duration >= _MIN_SATURATION_TIME_S:
+                entries.append(TimelineEntry(start_time, "throttle", f"{name} for {duration:.1f} s"))
     entries += [
         TimelineEntry(event.time, "event", event.text if event.level == "info" else f"{event.level}: {event.text}")
         for event in log.events
     ]
-    entries += _list_end_entries(log)
+    # The end of the flight, with time, distance and energy; an imported log may contain no battery data.
+    distance = float(np.nansum(np.sqrt((np.diff(track.position, axis=0) ** 2).sum(axis=1))))
+    end_reason = log.ended if log.ended is not None else "not recorded"
+    energy_used = float(track.energy[-1])
+    energy_text = f", {energy_used:.1f} Wh from the battery" if math.isfinite(energy_used) else ""
+    end_text = f"{end_reason}; {log.end_time:.1f} s, {distance / 1000.0:.2f} km{energy_text}"
+    entries.append(TimelineEntry(log.end_time, "end", end_text))
+    if not log.complete:
+        entries.append(TimelineEntry(log.end_time, "log", f"the log is not complete: {log.problem}"))
     # Unprintable characters could control the terminal.
     clean_entries = [
         TimelineEntry(entry.time, entry.kind, "".join(letter if letter.isprintable() else " " for letter in entry.text))
@@ -215,58 +236,18 @@ def _list_clearance_entries(log: FlightLog, rows_by_leg: list[_LegRows]) -> list
 
 
 def _list_threat_entries(log: FlightLog) -> list[TimelineEntry]:
-    """List each entry into and exit from the range of a missile or a radar."""
+    """List each entry into and exit from the range of a missile or a radar, with duration and closest distance.
+
+    If the track ends inside the sphere, the second entry says so.
+    """
     threats, track = log.setup.scenario.threats, log.track
     entries = []
     for k, name in enumerate(threats.names):
         for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
             for stay in passages(track.time, track.position, threats.position[k], float(radius)):
-                entries += _list_stay_entries(name, unit, float(radius), stay)
-    return entries
-
-
-def _list_stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
-    """List the start and the end of one stay in a sphere, with its duration and the closest distance.
-
-    If the track ends inside the sphere, the second entry says so.
-    """
-    entry = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
-    stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
-    if not stay.whole:
-        return [entry, TimelineEntry(stay.end, "threat", f"still inside the {unit} range of {name}: {stay_text}")]
-    return [entry, TimelineEntry(stay.end, "threat", f"outside the {unit} range of {name}: {stay_text}")]
-
-
-def _list_throttle_entries(track: Track) -> list[TimelineEntry]:
-    """List the periods in which the throttle is full or closed for at least `_MIN_SATURATION_TIME_S`."""
-    _, _, _, throttle = track.commands.T
-    entries = []
-    for name, is_held in (
-        ("full", throttle >= 1.0 - _THROTTLE_LIMIT_TOLERANCE),
-        ("closed", throttle <= _THROTTLE_LIMIT_TOLERANCE),
-    ):
-        padded = np.concatenate([[False], is_held, [False]])
-        edges = np.flatnonzero(padded[1:] != padded[:-1])
-        for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            start = float(track.time[first])
-            # A command holds until the next row.
-            duration = float(track.time[min(end, len(track) - 1)]) - start
-            if duration >= _MIN_SATURATION_TIME_S:
-                entries.append(TimelineEntry(start, "throttle", f"{name} for {duration:.1f} s"))
-    return entries
-
-
-def _list_end_entries(log: FlightLog) -> list[TimelineEntry]:
-    """List the end of the flight, with time, distance and energy, and any fault of the log."""
-    track = log.track
-    steps = np.diff(track.position, axis=0)
-    distance = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))
-    end_reason = log.ended if log.ended is not None else "not recorded"
-    energy_used = float(track.energy[-1])
-    # An imported log may contain no battery data.
-    energy_text = f", {energy_used:.1f} Wh from the battery" if math.isfinite(energy_used) else ""
-    text = f"{end_reason}; {log.end_time:.1f} s, {distance / 1000.0:.2f} km{energy_text}"
-    entries = [TimelineEntry(log.end_time, "end", text)]
-    if not log.complete:
-        entries.append(TimelineEntry(log.end_time, "log", f"the log is not complete: {log.problem}"))
+                place = f"the {unit} range of {name}"
+                entries.append(TimelineEntry(stay.start, "threat", f"inside {place} ({float(radius):.0f} m)"))
+                side = "outside" if stay.whole else "still inside"
+                stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
+                entries.append(TimelineEntry(stay.end, "threat", f"{side} {place}: {stay_text}"))
     return entries

@@ -1,7 +1,7 @@
 """Measure two flights alike from their logs alone, and compare them."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,27 +91,26 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
     if names[0] == names[1]:
         names = (f"{names[0]} (first)", f"{names[1]} (second)")
     verdicts = (_judge_log(first), _judge_log(second))
-    measures = [
-        _measure_flight(log.setup, log.track) | _collect_verdict_margins(verdict)
-        for log, verdict in zip((first, second), verdicts, strict=True)
-    ]
+    notes = _list_difference_notes(first, second, names)
+    measures = []
+    for log, log_name, verdict in zip((first, second), names, verdicts, strict=True):
+        values = _measure_flight(log.setup, log.track)
+        values["findings that fail", ""] = float(sum(finding.ok is False for finding in verdict.findings))
+        for rule_name, rule in RULE_WORDS.items():
+            closest = closest_to_limit(finding for finding in verdict.findings if finding.rule == rule_name)
+            if closest is not None:
+                margin = math.nan if closest.margin is None else closest.margin
+                values[f"smallest margin: {rule.word}", closest.unit] = margin
+        measures.append(values)
+        # Smallest margins that are negative, but within the tolerance.
+        notes += [
+            f"smallest margin: {RULE_WORDS[rule_name].word} of {log_name}: passes, {finding.tolerance_note}"
+            for rule_name, finding in verdict.closest.items()
+            if finding.tolerance_note
+        ]
     keys = list(dict.fromkeys([*measures[0], *measures[1]]))
     differences = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
-    return Comparison(
-        (first, second),
-        names,
-        verdicts,
-        tuple(differences),
-        (*_list_difference_notes(first, second, names), *_list_tolerance_notes(names, verdicts)),
-    )
-
-
-def _list_tolerance_notes(names: tuple[str, str], verdicts: tuple[Verdict, Verdict]) -> Iterator[str]:
-    """Yield a note for each rule whose smallest margin is negative, but within the tolerance."""
-    for name, verdict in zip(names, verdicts, strict=True):
-        for rule, finding in verdict.closest.items():
-            if finding.tolerance_note:
-                yield f"smallest margin: {RULE_WORDS[rule].word} of {name}: passes, {finding.tolerance_note}"
+    return Comparison((first, second), names, verdicts, tuple(differences), tuple(notes))
 
 
 def _judge_log(log: FlightLog) -> Verdict:
@@ -165,17 +164,6 @@ def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[
     """Apply a reduction, such as a mean or a maximum, to the finite values; NaN if there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
-
-
-def _collect_verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
-    """Return the number of failed findings and the smallest margin of each rule, by (name, unit)."""
-    values = {("findings that fail", ""): float(sum(finding.ok is False for finding in verdict.findings))}
-    for name, rule in RULE_WORDS.items():
-        closest = closest_to_limit(finding for finding in verdict.findings if finding.rule == name)
-        if closest is not None:
-            margin = math.nan if closest.margin is None else closest.margin
-            values[f"smallest margin: {rule.word}", closest.unit] = margin
-    return values
 
 
 def _list_difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
@@ -329,13 +317,28 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     views = comparison_views((first, second))
     figures = {name: draw(view) for name, view in views.items()}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
-    page = _render_page(comparison, (first, second), views, files)
+    pictures = [(*_PICTURES[name.removesuffix(".png")], picture_data_url(picture)) for name, picture in files.items()]
+    data, script = comparison_data((first, second), views), script_text(CHART_SCRIPTS)
+    page = page_template("compare.html").render(
+        names=comparison.names,
+        verdicts=list(zip(comparison.names, comparison.verdicts, strict=True)),
+        rows=difference_rows(comparison),
+        notes=comparison.notes,
+        pictures=pictures,
+        style=Markup(style_text("style", "compare")),
+        scene=Markup(script_json(data["scene"])),
+        flight_data=Markup(script_json(data["flight"])),
+        chart_data=Markup(script_json(data["charts"])),
+        library=page_library(),
+        script=Markup(script),
+        script_digest=script_digest(script),
+    )
     if svg:
         files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     files["compare.html"] = page.encode("utf-8")
     out_dir.mkdir(parents=True, exist_ok=True)
-    for name, data in files.items():
-        write_atomically(out_dir / name, data)
+    for name, content in files.items():
+        write_atomically(out_dir / name, content)
     return [out_dir / name for name in files]
 
 
@@ -368,25 +371,3 @@ def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str
     ]
     charts = {_PICTURES[name][0]: view_json(view) for name, view in views.items()}
     return {"scene": scene, "flight": {"flights": moments}, "charts": charts}
-
-
-def _render_page(
-    comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
-) -> str:
-    """Return the comparison's page with its pictures, charts and scripts."""
-    pictures = [(*_PICTURES[name.removesuffix(".png")], picture_data_url(data)) for name, data in files.items()]
-    data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
-    return page_template("compare.html").render(
-        names=comparison.names,
-        verdicts=list(zip(comparison.names, comparison.verdicts, strict=True)),
-        rows=difference_rows(comparison),
-        notes=comparison.notes,
-        pictures=pictures,
-        style=Markup(style_text("style", "compare")),
-        scene=Markup(script_json(data["scene"])),
-        flight_data=Markup(script_json(data["flight"])),
-        chart_data=Markup(script_json(data["charts"])),
-        library=page_library(),
-        script=Markup(script),
-        script_digest=script_digest(script),
-    )

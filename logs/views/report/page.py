@@ -277,7 +277,10 @@ def _render_page(
     """
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.points))
-    shown_pictures = report_pictures(subject, page_charts(views), pictures)
+    charts, flight = page_charts(views), report_flight(setup, track)
+    shown_pictures = report_pictures(subject, charts, pictures)
+    scene = charts.pop("scene")
+    script = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
     return page_template("report.html").render(
         name=setup.scenario.name,
         verdict=verdict,
@@ -306,28 +309,18 @@ def _render_page(
         energy=tables.energy_facts(setup, track),
         command=command,
         reproducibility=tables.reproducibility_facts(setup, versions),
-        **_make_page_data(setup, track, views),
+        # Data for the scripts of the page, escaped for HTML, and the scripts.
+        style=Markup(style_text("style", "report")),
+        scene=Markup(script_json(scene)),
+        flight_data=Markup(script_json(flight)),
+        chart_data=Markup(script_json(charts)),
+        threats=len(setup.scenario.threats),
+        moments=bool(flight["flights"]),
+        timed=bool(flight["flights"]) and any(isinstance(view, Chart) and view.timed for view in views.values()),
+        library=page_library(),
+        script=Markup(script),
+        script_digest=script_digest(script),
     )
-
-
-def _make_page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the data for the scripts of the page, escaped for HTML, and the scripts."""
-    script = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
-    flight = report_flight(setup, track)
-    charts = page_charts(views)
-    scene = charts.pop("scene")
-    return {
-        "style": Markup(style_text("style", "report")),
-        "scene": Markup(script_json(scene)),
-        "flight_data": Markup(script_json(flight)),
-        "chart_data": Markup(script_json(charts)),
-        "threats": len(setup.scenario.threats),
-        "moments": bool(flight["flights"]),
-        "timed": bool(flight["flights"]) and any(isinstance(view, Chart) and view.timed for view in views.values()),
-        "library": page_library(),
-        "script": Markup(script),
-        "script_digest": script_digest(script),
-    }
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:

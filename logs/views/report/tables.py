@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track, control_limits, saturated_rows
+from flight.simulation.track import ROLL, Track, control_limits, saturated_rows
 from logs.verdict.measures.path_sweeps import passages, segment_clearances
 from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
 from logs.views.report.text import NOTHING, number, quantity
@@ -82,7 +82,23 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
             number(float(waypoints[leg + 1, 2]), digits=1),
             turn,
         )
-        rows.append(LegRow(planned_cells + _make_flown_cells(track, heights_above_ground, leg), leg in failing))
+        flown_cells: tuple[str, ...] = (NOTHING,) * 7
+        leg_track_rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
+        if track is not None and leg_track_rows.size:
+            # A leg ends at the first row of the next leg.
+            first, last = int(leg_track_rows[0]), min(int(leg_track_rows[-1]) + 1, len(track) - 1)
+            roll = track.attitude[leg_track_rows, ROLL]
+            lowest = None if heights_above_ground is None else _find_min_finite(heights_above_ground[leg_track_rows])
+            flown_cells = (
+                number(float(track.time[last] - track.time[first]), digits=1),
+                number(float(np.mean(track.airspeed[leg_track_rows], dtype=np.float64)), digits=1),
+                number(math.degrees(_find_max_magnitude(roll)), digits=1),
+                number(_find_max_magnitude(track.cross_track[leg_track_rows]), digits=2),
+                number(_find_max_magnitude(track.height_error[leg_track_rows]), digits=2),
+                number(lowest, digits=1),
+                number(float(track.energy[last]) - float(track.energy[first]), digits=2),
+            )
+        rows.append(LegRow(planned_cells + flown_cells, leg in failing))
     return rows
 
 
@@ -96,25 +112,6 @@ def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
         return None
     end = track.position[-1]
     return np.append(segment_clearances(terrain, track.position)[0], end[2] - terrain.height(end[0], end[1]))
-
-
-def _make_flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: int) -> tuple[str, ...]:
-    """Return the flown values of a leg; dashes for a leg that was not flown."""
-    rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
-    if track is None or rows.size == 0:
-        return (NOTHING,) * 7
-    roll, _, _ = track.attitude[rows].T
-    # A leg ends at the first row of the next leg.
-    last = min(int(rows[-1]) + 1, len(track) - 1)
-    return (
-        number(float(track.time[last] - track.time[rows[0]]), digits=1),
-        number(float(np.mean(track.airspeed[rows], dtype=np.float64)), digits=1),
-        number(math.degrees(_find_max_magnitude(roll)), digits=1),
-        number(_find_max_magnitude(track.cross_track[rows]), digits=2),
-        number(_find_max_magnitude(track.height_error[rows]), digits=2),
-        number(_find_min_finite(heights_above_ground[rows]) if heights_above_ground is not None else None, digits=1),
-        number(float(track.energy[last]) - float(track.energy[rows[0]]), digits=2),
-    )
 
 
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
@@ -193,7 +190,26 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     facts.append(
         ("Threats", f"{len(scenario.threats)} units: {missile_count} with missiles, {radar_count} with radars")
     )
-    facts += _list_limit_facts(setup)
+    limits, wind = scenario.limits, scenario.wind
+    # A limit on an angle that the scenario states as text is the aircraft's limit.
+    max_turn, max_climb, max_dive = (
+        "the aircraft's" if isinstance(limit, str) else quantity(limit, "deg")
+        for limit in (limits.max_turn_deg, limits.max_climb_deg, limits.max_dive_deg)
+    )
+    limits_text = (
+        f"turn {max_turn}, climb {max_climb}, dive {max_dive}; {quantity(limits.min_clearance_m, 'm')} above ground; "
+        f"within {quantity(setup.corridor, 'm')} of the legs"
+    )
+    wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
+    if wind.gradient:
+        gradient_text = number(100.0 * wind.gradient, signed=True)
+        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gradient_text} m/s per 100 m of height"
+    if wind.forecast is not None:
+        wind_text = f"{wind.forecast.describe()}; mean profile {wind_text}"
+    facts += [
+        ("Limits", limits_text),
+        ("Wind", f"{wind_text if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
+    ]
     return facts
 
 
@@ -201,31 +217,6 @@ def _format_position(lat_deg: float, lon_deg: float) -> str:
     """Return latitude and longitude as text, in degrees."""
     ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
     return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
-
-
-def _list_limit_facts(setup: FlightSetup) -> Facts:
-    """Return facts on the scenario's limits and wind."""
-    limits, wind = setup.scenario.limits, setup.scenario.wind
-
-    def describe_angle(value: float | str) -> str:
-        """Return a limit on an angle as text, or a text which states that the aircraft's limit applies."""
-        return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
-
-    wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
-    if wind.gradient:
-        gradient_text = number(100.0 * wind.gradient, signed=True)
-        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gradient_text} m/s per 100 m of height"
-    if wind.forecast is not None:
-        wind_text = f"{wind.forecast.describe()}; mean profile {wind_text}"
-    return [
-        (
-            "Limits",
-            f"turn {describe_angle(limits.max_turn_deg)}, climb {describe_angle(limits.max_climb_deg)}, "
-            f"dive {describe_angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground; "
-            f"within {quantity(setup.corridor, 'm')} of the legs",
-        ),
-        ("Wind", f"{wind_text if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
-    ]
 
 
 def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:

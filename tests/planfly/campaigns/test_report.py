@@ -158,16 +158,14 @@ def test_few_flights_say_what_they_show_of_each_direction(base: CampaignBase, tm
     """Flown in 0° up to 6 and failed from 8 m/s, in 90° and 180° flown in 5, in 270° lost or failed in 9 m/s."""
     flights = ((0, 6.0, True), (0, 8.0, False), (0, 9.0, True), (1, 5.0, True), (2, 5.0, True), (3, 9.0, False))
     found = replace(FOUND, flights=flights, lost=())
-    start = wind_lines(found).index(
-        "directions in which the boundary is not proven, with the wind speed that their own flights suggest:"
-    )
+    start = wind_lines(found).index("directions in which the boundary is not proven, with their own flights:")
     assert wind_lines(found)[start + 1 : start + 4] == [
-        "  from 0°: between 6.0 and 8.0 m/s (3 flights)",
-        "  from 90° to 180°: at least 5.0 m/s (2 flights)",
-        "  from 270°: below 9.0 m/s (1 flight)",
+        "  from 0°: no failure up to 6.0 m/s, weakest failure at 8.0 m/s (1 of 3 flights failed)",
+        "  from 90° to 180°: no failure up to 5.0 m/s (0 of 2 flights failed)",
+        "  from 270°: weakest failure at 9.0 m/s (1 of 1 flight failed)",
     ]
-    assert "  from 270°: not enough flights (1 flight)" in wind_lines(replace(found, lost=(5,)))
-    assert "  from 270°: not enough flights (1 flight)" in wind_lines(replace(found, undecided=((5, "x"),)))
+    assert "  from 270°: not enough flights (0 of 1 flight failed)" in wind_lines(replace(found, lost=(5,)))
+    assert "  from 270°: not enough flights (0 of 1 flight failed)" in wind_lines(replace(found, undecided=((5, "x"),)))
     assert not any("without a boundary" in line for line in wind_lines(ESTIMATED))
     write_winds(tmp_path, base, found, "planfly winds x")
     directions = json.loads((tmp_path / "winds.json").read_text())["directions"]

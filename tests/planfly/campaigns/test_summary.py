@@ -94,6 +94,12 @@ def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp
         )
         assert world.endswith("; terrain flat at 100 m, heights above mean sea level")
         assert pilot.startswith("  Flown by: ")
+        named = replace(summary, dispersions={"wind_speed": {}, "battery": {}})
+        assert campaign_lines(named)[7] == (
+            "  Varied around these conditions: wind speed, battery; the same in every flight: wind direction, wind"
+            " gradient, turbulence, mass, drag, control power, terrain height, start position east,"
+            " start position north, start altitude"
+        )
         data = json.loads(summary_json(summary))["conditions"]
         assert (data["aircraft"], data["mass_kg"], data["airspeed_mps"]) == ("aerosonde", 11.0, 25.0)
         assert (data["wind_mps"], data["wind_from_deg"], data["turbulence"]) == (5.0, 250.0, "light")

@@ -1,6 +1,7 @@
 """``planfly check``: PX4's rules by name, and a climb on the spot, which is judged and not refused."""
 
 import json
+import math
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,22 +20,37 @@ MISSION = """QGC WPL 110
 """
 
 
-@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (1434, "climbs"), (210.5, "climbs")])
+@pytest.mark.parametrize("up", [1434, 650])
 def test_a_climb_on_the_spot_is_judged_and_not_flyable(
-    up: float, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    up: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """450 m up are too steep for the 1.35 km of the next leg, too: 18 degrees."""
     mission = tmp_path / "up.waypoints"
     mission.write_text(MISSION.format(up=up), encoding="utf-8")
     assert main(["check", str(mission), "--geometry", "--json", str(tmp_path / "verdict.json")]) == 4
     verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
     failed = [item for item in verdict["findings"] if item["ok"] is False]
     assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1 (to item 3)")]
-    rise, angle = abs(up - 200), "89.9" if up == 210.5 else "90.0"
-    assert abs(failed[0]["planned"]) == pytest.approx(float(angle), abs=0.1)
-    assert f"leg 1 {verb} {rise:g} m vertically, {angle}°; the aircraft's limit is " in failed[0]["reason"]
+    assert abs(failed[0]["planned"]) == pytest.approx(90.0, abs=0.1)
+    assert f"leg 1 climbs {up - 200:g} m vertically, 90.0°; the aircraft's limit is " in failed[0]["reason"]
     assert "m (it is vertical)" in failed[0]["suggestion"]
     assert main(["fly", str(mission), "--log", str(tmp_path / "flight.mcap")]) == 4
     assert "vertically" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("up", "geometry"), [(350, 3), (210.5, 3), (80, 0)])
+def test_a_change_of_altitude_on_the_spot_is_flown_on_the_next_leg(up: float, geometry: int, tmp_path: Path) -> None:
+    """ArduPlane passes both items at once; below the leg as drawn, only a flight tells."""
+    mission = tmp_path / "up.waypoints"
+    mission.write_text(MISSION.format(up=up), encoding="utf-8")
+    assert main(["check", str(mission), "--geometry", "--json", str(tmp_path / "verdict.json")]) == geometry
+    verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
+    (slope,) = (
+        item for item in verdict["findings"] if item["where"] == "leg 1 (to item 3)" and item["rule"] == "slope"
+    )
+    run = math.hypot(1112.0, 764.0)
+    assert slope["planned"] == pytest.approx(math.degrees(math.atan((up - 200) / run)), rel=0.01)
+    assert main(["check", str(mission)]) == 0
 
 
 @pytest.mark.parametrize("up", [201.5, 209.5, 190.5])

@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,8 +20,10 @@ from logs.verdict.measures.route_requirements import judged_surveys, route_requi
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
+from planfly.api.surveying import SurveyResult
 from planfly.surveys import survey_remedies as remedies
 from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text, slow_camera_text
+from planfly.terminal.survey_answers import overlap_entry
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.uav import uav_of_setup
 from tests.mission_lines import mission, setup_of, wp
@@ -255,3 +257,35 @@ def test_lines_over_unknown_ground_are_neither_usable_nor_lost_and_nothing_is_tr
     assert text.startswith("nothing was tried: 2 photo lines outside the data of ")
     assert text.endswith(" an elevation file of the whole survey is needed (--terrain)")
     assert open_.survey_lines[-2].endswith("1000 m  not judged: 10 % over unknown ground")
+
+
+def test_a_survey_states_gates_that_no_autopilot_flies_to(tmp_path: Path) -> None:
+    """A gate 15 m beside the line switches the camera where the line passes it, not where it was drawn."""
+    items = []
+    for k in range(3):
+        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
+        on = [wp(50.0 * k + 15.0, north[1], 100.0, command=4501), "2 206 25 0 1 0 0 0 0"]
+        off = [wp(50.0 * k, north[2], 100.0, command=4501), "2 206 0 0 1 0 0 0 0"]
+        items += [wp(50.0 * k, north[0], 100.0), *on, *off, wp(50.0 * k, north[3], 100.0)]
+    setup = setup_with(tmp_path, mission(*items))
+    reason = "no autopilot flies to a gate (CONDITION_GATE): a survey with gates needs turn-arounds"
+    result = SurveyResult(setup, cast(Any, None), cast(Any, None), (), ())
+    assert f"note: items 2, 8, 14: passed at more than 10 m, because {reason}" in result.survey_lines
+
+
+@pytest.mark.parametrize(("crabs", "judged"), [((0.0, 0.0), True), ((0.5236, 0.5236), False)])
+def test_the_crab_angle_is_part_of_the_answer(crabs: tuple[float, float], judged: bool) -> None:
+    """Photos of 200 m by 100 m, 50 m apart: 1 - 50 / 200; turned alike (1 - 50 cos 30 / 200) (1 - 50 sin 30 / 100).
+
+    The common area of 0.588 at 30 degrees is below the required 0.7, although the side overlap is not.
+    """
+    camera = Camera(2.0, 1.0, 0.7, 0.7)
+    measure = OverlapMeasure(camera, side=0.75, line_pair=(1, 0), line_spacing=50.0, side_height=100.0)
+    measure = replace(measure, side_crabs=crabs, max_crab=crabs[0])
+    entry = overlap_entry(measure)
+    assert (entry.side_judged, entry.side_lines) == (judged, (1, 2))
+    assert entry.crab_angle_deg == pytest.approx(math.degrees(crabs[0]), abs=0.05)
+    expected = (1.0 - 50.0 * math.cos(crabs[0]) / 200.0) * (1.0 - 50.0 * math.sin(crabs[0]) / 100.0)
+    assert entry.side_common_area == pytest.approx(expected, abs=0.002)
+    result = SurveyResult(cast(Any, None), cast(Any, None), cast(Any, None), (), (), (measure,))
+    assert ("crab angle up to 30°" in result.headline) is not judged

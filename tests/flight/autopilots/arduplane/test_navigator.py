@@ -109,6 +109,28 @@ def test_a_leg_that_is_passed_when_it_begins_is_drawn_from_where_it_is() -> None
     assert (own.from_north, own.from_up) == (950.0, 498.0)
 
 
+@pytest.mark.parametrize(
+    ("east", "north", "reached", "leg"),
+    [
+        # Flying north: the bearing between identical positions is east, so that the first is passed 90 m before it.
+        (0.0, 1000.0, (0.0, 909.0), 0),
+        (0.0, 1000.0, (0.0, 911.0), 1),
+        # Flying east: no turn, so that the first is passed at the line across it, and the second at once behind it.
+        (1000.0, 0.0, (999.0, 0.0), 0),
+        (1000.0, 0.0, (1002.0, 0.0), 2),
+    ],
+)
+def test_a_repeated_position_is_passed_without_turning_back(
+    east: float, north: float, reached: tuple[float, float], leg: int
+) -> None:
+    """`Plane::set_next_WP` draws a leg without length from the aircraft; `setup_turn_angle` then measures its turn."""
+    way = waypoints((0, 0, 500), (east, north, 500), (east + 0.01, north, 540), (2 * east, 2 * north, 540))
+    own = memory()
+    for _ in range(2):
+        navigate_legs(flying(*reached), way, parameters(), own, 1.0, 0.1)
+    assert own.leg == leg
+
+
 def test_its_side_acceleration_is_l1s() -> None:
     # 10 m right of its line: 4 damping^2 V^2 / L sin(asin(10 / L)) to the left.
     way = waypoints((0, 0, 500), (0, 5000, 500), (1000, 5000, 500))

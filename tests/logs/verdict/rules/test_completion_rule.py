@@ -28,6 +28,7 @@ def test_an_unfinished_flight_is_never_flyable(setup: FlightSetup) -> None:
     assert of(verdict, "turn", waypoint(3)).ok is None
     assert of(verdict, "waypoint", waypoint(2)).ok is False
     assert of(verdict, "completion").flown == 1.0
+    assert "1 of 4 legs flown; the first leg that was not flown to its end is leg 1" in of(verdict, "completion").reason
     # The same track is not complete even if its recorder says so, nor is a whole one in a damaged log.
     assert not judge(setup, fly_path(setup, stop=3000.0)).complete
     assert not judge(setup, fly_path(setup), log_complete=False).complete

@@ -226,23 +226,27 @@ def test_a_step_is_flown_within_its_own_height(rise: float, ok: bool) -> None:
         (ArduPlane(ArduPilotParameters.defaults()), -40.0, 1000.0, math.degrees(math.atan2(-50.0, 1000.0))),
         # 50 m on 350 m are 8.1 degrees, and 7.8 can be flown.
         (ArduPlane(ArduPilotParameters.defaults()), -40.0, 350.0, None),
-        (ArduPlane(ArduPilotParameters.defaults()), 40.0, 1000.0, None),
+        # 40 m up on the spot and 10 m down: without a flight open, because the aircraft is below the leg.
+        (ArduPlane(ArduPilotParameters.defaults()), 40.0, 1000.0, math.degrees(math.atan2(30.0, 1000.0))),
+        # 110 m on 350 m are 17 degrees.
+        (ArduPlane(ArduPilotParameters.defaults()), 120.0, 350.0, None),
         # PX4 holds there outside NAV_FW_ALT_RAD.
         (Px4(Px4Parameters.defaults()).with_parameters(NAV_FW_ALT_RAD=39.0), -40.0, 1000.0, None),
         (Px4(Px4Parameters.defaults()).with_parameters(NAV_FW_ALT_RAD=41.0), -40.0, 1000.0, -2.8624),
         (PlanflyGuidance(), -40.0, 1000.0, None),
     ],
 )
-def test_a_descent_on_the_spot_is_flown_on_the_next_leg(
+def test_a_vertical_leg_is_flown_on_the_next_leg(
     autopilot: Autopilot, rise: float, run: float, slope: float | None
 ) -> None:
     up = 300.0 + rise
     points = [[0, 0, 300], [0, 1000, 300], [0, 1000.1, up], [0, 1000.1 + run, up - 10.0], [0, 3000 + run, up - 10.0]]
     setup = replace(make_setup(points), autopilot=autopilot)
-    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+    for verdict, is_open in ((judge_geometry(setup), rise > 0.0), (judge(setup, fly_path(setup)), False)):
         item = of(verdict, "slope", leg(1))
-        assert item.ok is (slope is not None)
-        assert item.planned == pytest.approx(math.copysign(89.86, rise) if slope is None else slope, abs=0.01)
+        assert item.ok is (False if slope is None else None if is_open else True)
+        vertical = math.copysign(math.degrees(math.atan2(abs(rise), 0.1)), rise)
+        assert item.planned == pytest.approx(vertical if slope is None else slope, abs=0.01)
 
 
 def test_a_staircase_is_as_high_as_its_stairs_together() -> None:
