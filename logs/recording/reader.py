@@ -340,8 +340,9 @@ def read_log(path: Path | str) -> FlightLog:
     loss = loss or result_fault or verdict_fault or reference_fault
     if is_recovered:
         recorded_loss = _parse_object(container.attachments[RECOVERY_FILE]).get("lost")
-        is_stated = isinstance(recorded_loss, str) and bool(recorded_loss)
-        loss = recorded_loss if is_stated else "the extent of the loss is unknown"
+        loss = "the extent of the loss is unknown"
+        if isinstance(recorded_loss, str) and recorded_loss:
+            loss = recorded_loss
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
