@@ -66,7 +66,14 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
             continue
         if zone.kind == "exclusion" and holes:
             closed_names.append(zone.name)
-        items += list(_zone_items(zone, origin))
+        if isinstance(zone.shape, Cylinder):
+            position = (zone.shape.east, zone.shape.north)
+            items.append(fence_item(origin, _CIRCLE_COMMANDS[zone.kind], zone.shape.radius, position))
+        for ring in rings:
+            if not is_hole(ring):
+                items += _ring_items(ring, _POLYGON_COMMANDS[zone.kind], origin)
+            elif zone.kind == "inclusion":
+                items += _ring_items(ring, _POLYGON_COMMANDS["exclusion"], origin)
     banded_names = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
     notes = []
     if banded_names:
@@ -79,18 +86,6 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
             "omitted, because of several separate parts"
         )
     return items, notes
-
-
-def _zone_items(zone: Zone, origin: GeoOrigin) -> Iterator[MissionItem]:
-    """Yield the fence items of one zone; see `zone_fences`."""
-    if isinstance(zone.shape, Cylinder):
-        yield fence_item(origin, _CIRCLE_COMMANDS[zone.kind], zone.shape.radius, (zone.shape.east, zone.shape.north))
-        return
-    for ring in zone.shape.rings:
-        if not is_hole(ring):
-            yield from _ring_items(ring, _POLYGON_COMMANDS[zone.kind], origin)
-        elif zone.kind == "inclusion":
-            yield from _ring_items(ring, _POLYGON_COMMANDS["exclusion"], origin)
 
 
 def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[MissionItem]:
@@ -214,7 +209,14 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
     fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
-    missile_zones, omitted_missiles = _omit_crossed_exclusions(_missile_zones(scenario), scenario.origin, passes)
+    threats = scenario.threats
+    # A cylinder with the missile's kill radius for each missile.
+    cylinders = [
+        Zone(str(name), "exclusion", make_cylinder(float(position[0]), float(position[1]), float(radius)))
+        for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True)
+        if radius > 0.0
+    ]
+    missile_zones, omitted_missiles = _omit_crossed_exclusions(cylinders, scenario.origin, passes)
     zones, omitted_zones = _omit_crossed_exclusions(scenario.zones, scenario.origin, passes)
     fences += zone_fences(missile_zones, scenario.origin)[0]
     items, zone_notes = zone_fences(zones, scenario.origin)
@@ -240,16 +242,6 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         notes.append(f"a fence does not follow the ground: the maximum height of {limit_text} is not part of it")
     all_fences = number_items([*fences, *mission.fences])
     return replace(mission, fences=all_fences), tuple(notes)
-
-
-def _missile_zones(scenario: Scenario) -> list[Zone]:
-    """Return an exclusion zone for each missile: a cylinder with the missile's kill radius."""
-    threats = scenario.threats
-    return [
-        Zone(str(name), "exclusion", make_cylinder(float(position[0]), float(position[1]), float(radius)))
-        for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True)
-        if radius > 0.0
-    ]
 
 
 def _omit_crossed_exclusions(

@@ -436,7 +436,13 @@ class _Steps:
                 if len(passed_indices) == _MAX_COMMANDS_IN_A_ROW_ARDUPLANE and self.long_command_chain < 0:
                     self.long_command_chain = self.items[index].seq
                 index = self._next_item(index + 1, counting=True)
-            leg_commands = self._commands_on_leg(passed_indices[0]) if passed_indices and index is not None else []
+            # ArduPlane has run the first command before the leg, and looks ahead for the others without counting jumps.
+            leg_commands: list[int] = []
+            if passed_indices and index is not None:
+                ahead = self._next_item(passed_indices[0] + 1, counting=False)
+                while ahead is not None and ahead not in leg_commands and not is_navigation(self.items[ahead].command):
+                    leg_commands.append(ahead)
+                    ahead = self._next_item(ahead + 1, counting=False)
             self.reached |= {self.items[command].seq for command in leg_commands}
             yield _Step(
                 tuple(self.items[command] for command in passed_indices),
@@ -445,20 +451,6 @@ class _Steps:
                 None if index is None else self.items[index],
             )
             index = None if index is None else index + 1
-
-    def _commands_on_leg(self, first_index: int) -> list[int]:
-        """Return the indices of the commands that ArduPlane runs on the leg to the next navigation item.
-
-        first_index: index of the command that ArduPlane has run before that leg.
-
-        Jump counters are read, but not changed.
-        """
-        commands: list[int] = []
-        index = self._next_item(first_index + 1, counting=False)
-        while index is not None and index not in commands and not is_navigation(self.items[index].command):
-            commands.append(index)
-            index = self._next_item(index + 1, counting=False)
-        return commands
 
     def _next_item(self, index: int, *, counting: bool) -> int | None:
         """Return the index of the next item that is not a jump; None at the mission's end (`get_next_cmd`).
@@ -473,10 +465,24 @@ class _Steps:
         while index < len(self.items):
             item = self.items[index]
             if counting:
-                self._count_item(item)
+                self.reached.add(item.seq)
+                self._step_count += 1
+                if self._step_count > _MAX_STEPS:
+                    raise MissionError(
+                        f"{self.mission.source}: item {item.seq}: jumps lead through more than {_MAX_STEPS:,} items",
+                        file=self.mission.source,
+                        field=f"item {item.seq}",
+                    )
             if item.command not in JUMPS:
                 return index
-            target, repeats = self._jump_target(item), int(item.params[1])
+            is_tag_jump, number, repeats = item.command == Command.DO_JUMP_TAG, int(item.params[0]), int(item.params[1])
+            index_by_number = self.tags if is_tag_jump else self.index
+            if number not in index_by_number:
+                missing_name = f"JUMP_TAG {number}" if is_tag_jump else f"item {number}"
+                problem = ItemProblem(f"{command_name(item.command)} p1", number, f"the mission has no {missing_name}")
+                location = f"{self.mission.source}: item {item.seq}"
+                raise MissionError(**problem.error_arguments(self.mission.source, location))
+            target = index_by_number[number]
             chain_length += 1
             if counting and chain_length in (_MAX_JUMPS_IN_A_ROW, _MAX_JUMPS_IN_A_ROW_ARDUPLANE):
                 self.jump_chains.setdefault(chain_length, item.seq)
@@ -497,32 +503,6 @@ class _Steps:
                     self.jump_counts[index] = 0 if self._resets_jump_counters else repeats
                 index += 1
         return None
-
-    def _count_item(self, item: MissionItem) -> None:
-        """Record that an item has been reached.
-
-        Raises MissionError if jumps lead through too many items.
-        """
-        self.reached.add(item.seq)
-        self._step_count += 1
-        if self._step_count > _MAX_STEPS:
-            raise MissionError(
-                f"{self.mission.source}: item {item.seq}: jumps lead through more than {_MAX_STEPS:,} items",
-                file=self.mission.source,
-                field=f"item {item.seq}",
-            )
-
-    def _jump_target(self, jump: MissionItem) -> int:
-        """Return the index of a jump's target. Raises MissionError if there is no such item."""
-        is_tag_jump, number = jump.command == Command.DO_JUMP_TAG, int(jump.params[0])
-        index_by_number = self.tags if is_tag_jump else self.index
-        if number not in index_by_number:
-            missing_name = f"JUMP_TAG {number}" if is_tag_jump else f"item {number}"
-            problem = ItemProblem(f"{command_name(jump.command)} p1", number, f"the mission has no {missing_name}")
-            raise MissionError(
-                **problem.error_arguments(self.mission.source, f"{self.mission.source}: item {jump.seq}")
-            )
-        return index_by_number[number]
 
 
 class _AutopilotNotes:
@@ -582,12 +562,24 @@ class _ItineraryBuilder:
                 self.notes.arduplane.add(
                     f"{command_name(item.command)} is flown one loop early, as in ArduPlane", item.seq
                 )
-        if step.target is not None:
-            self._fly_item(step.target)
-        else:
+        target = step.target
+        if target is not None and not target.autocontinue:
+            self._note_wait(target)
+        if target is None:
             for item in step.commands[1:]:
                 text = f"{command_name(item.command)} is not run, because no waypoint follows it"
                 self.notes.arduplane.add(text, item.seq)
+        elif target.command in TAKEOFFS:
+            self._add_take_off(target)
+        elif target.command in PLACES:
+            self._add_stop(target)
+        elif target.command == Command.NAV_RETURN_TO_LAUNCH:
+            self._add_return(target)
+        elif target.command in LANDINGS:
+            self._add_landing(target)
+        else:
+            self._note_unsimulated_command(target, as_px4=False)
+            self._note_unsimulated_command(target, as_px4=True)
         for item in arduplane_commands[1:]:
             if item.command == Command.DO_SET_HOME:
                 self._set_home(item)
@@ -681,22 +673,6 @@ class _ItineraryBuilder:
             self.add_open_item(
                 "autocontinue is 0, so PX4 would wait, but the simulated flight continues", item.seq, arduplane=False
             )
-
-    def _fly_item(self, item: MissionItem) -> None:
-        """Add the stops of a navigation item, or note that its command is not simulated."""
-        if not item.autocontinue:
-            self._note_wait(item)
-        if item.command in TAKEOFFS:
-            self._add_take_off(item)
-        elif item.command in PLACES:
-            self._add_stop(item)
-        elif item.command == Command.NAV_RETURN_TO_LAUNCH:
-            self._add_return(item)
-        elif item.command in LANDINGS:
-            self._add_landing(item)
-        else:
-            self._note_unsimulated_command(item, as_px4=False)
-            self._note_unsimulated_command(item, as_px4=True)
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
         """Return the stop of an item, with the current speeds and home, and the gates since the last stop.

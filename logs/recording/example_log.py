@@ -14,7 +14,7 @@ from logs.recording.recorder import Recorder
 from logs.recording.setup_attachments import package_versions
 from world.arrays import Floats
 from world.frames import to_geo
-from world.scenario import Scenario, scenario_from_spec
+from world.scenario import scenario_from_spec
 
 # Waypoints of two legs with a turn of 14 degrees between them; east, north, up in m.
 _WAYPOINTS = np.array([[-500.0, 0.0, 200.0], [0.0, 0.0, 200.0], [400.0, 100.0, 220.0]])
@@ -45,7 +45,25 @@ def example_log() -> FlightLog:
     ('completed', True)
     """
     scenario = scenario_from_spec(dict(_SCENARIO), "example")
-    mission = _mission(scenario)
+    lat, lon = to_geo(scenario.origin, _WAYPOINTS[:, 0], _WAYPOINTS[:, 1])
+    command, params = int(Command.NAV_WAYPOINT), (0.0, 0.0, 0.0, 0.0)
+    items = tuple(
+        MissionItem(k + 1, command, 0, params, float(lat[k]), float(lon[k]), float(up))
+        for k, up in enumerate(_WAYPOINTS[:, 2])
+    )
+    mission = Mission(home=None, items=items, source="example")
+    envelope = Envelope(
+        aircraft="aerosonde",
+        model_hash="",
+        motor_braking=True,
+        airspeed=np.array([18.0, 33.0]),
+        amsl=np.array([0.0, 2000.0]),
+        climb=np.full((2, 2), 0.2),
+        descent=np.full((2, 2), 0.15),
+        level_speed_min=np.full(2, 16.0),
+        level_speed_max=np.full(2, 35.0),
+        max_bank=0.7,
+    )
     setup = FlightSetup(
         scenario=scenario,
         mission=mission,
@@ -53,7 +71,7 @@ def example_log() -> FlightLog:
             points=route_points(_WAYPOINTS, _AIRSPEED, item=[item.seq for item in mission.items]),
             started="Started in the air at waypoint 0.",
         ),
-        limits=make_limits(scenario, _envelope(), _AIRSPEED, 0.5),
+        limits=make_limits(scenario, envelope, _AIRSPEED, 0.5),
         aircraft="aerosonde",
         battery=200.0,
         seed=1,
@@ -91,32 +109,6 @@ def write_example_log(path: Path) -> Path:
             recorder.event(event.time, event.text, event.level)
         recorder.finish("completed")
     return path
-
-
-def _mission(scenario: Scenario) -> Mission:
-    """Return a mission of one waypoint item for each of the waypoints."""
-    lat, lon = to_geo(scenario.origin, _WAYPOINTS[:, 0], _WAYPOINTS[:, 1])
-    items = tuple(
-        MissionItem(k + 1, int(Command.NAV_WAYPOINT), 0, (0.0, 0.0, 0.0, 0.0), float(lat[k]), float(lon[k]), float(up))
-        for k, up in enumerate(_WAYPOINTS[:, 2])
-    )
-    return Mission(home=None, items=items, source="example")
-
-
-def _envelope() -> Envelope:
-    """Return a simplified envelope: constant climb, descent and level speeds."""
-    return Envelope(
-        aircraft="aerosonde",
-        model_hash="",
-        motor_braking=True,
-        airspeed=np.array([18.0, 33.0]),
-        amsl=np.array([0.0, 2000.0]),
-        climb=np.full((2, 2), 0.2),
-        descent=np.full((2, 2), 0.15),
-        level_speed_min=np.full(2, 16.0),
-        level_speed_max=np.full(2, 35.0),
-        max_bank=0.7,
-    )
 
 
 def _track() -> Track:

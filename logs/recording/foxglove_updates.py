@@ -139,8 +139,14 @@ class FlightEvents:
         """
         if not len(log_times):
             return
+        route = self._route
         for k in np.flatnonzero(np.diff(leg, prepend=self._leg) != 0).tolist():
-            yield self._event_record(int(log_times[k]), self._leg_text(int(leg[k])), "info")
+            # The start of a leg: its number, and the waypoint and item to which it leads.
+            text, waypoint = f"leg {int(leg[k])}", int(leg[k]) + 1
+            if 0 <= waypoint < len(route.items):
+                item_text = f" (item {route.items[waypoint]})" if route.items[waypoint] >= 0 else ""
+                text = f"leg {route.leg_numbers[waypoint - 1]}, to waypoint {route.stops[waypoint]}{item_text}"
+            yield self._event_record(int(log_times[k]), text, "info")
         self._leg = int(leg[-1])
         slots = log_times // _CHECK_INTERVAL_NS
         checked_rows = np.flatnonzero(np.diff(slots, prepend=self._slot) > 0)
@@ -160,14 +166,6 @@ class FlightEvents:
                 level = "warning" if has_entered and kind == "missile range" else "info"
                 yield self._event_record(int(log_times[checked_rows[row]]), text, level)
             self._inside[kind] = is_inside[-1]
-
-    def _leg_text(self, leg: int) -> str:
-        """Describe the start of a leg: its number, and the waypoint and item to which it leads."""
-        route, waypoint = self._route, leg + 1
-        if not 0 <= waypoint < len(route.items):
-            return f"leg {leg}"
-        item_text = f" (item {route.items[waypoint]})" if route.items[waypoint] >= 0 else ""
-        return f"leg {route.leg_numbers[leg]}, to waypoint {route.stops[waypoint]}{item_text}"
 
     def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
         """Make the message record of one event.

@@ -228,10 +228,21 @@ class ContainerWriter:
         """Write the end of the data section and the summary; the file stays open."""
         self._write_bytes(_record_bytes(DataEnd(self._crc)))
         start = self._offset
+        statistics = Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=dict(sorted(self._counts.items())),
+            chunk_count=len(self._chunks),
+            message_count=self._counts.total(),
+            message_end_time=max((chunk.content_end for chunk in self._chunks), default=0),
+            message_start_time=min((chunk.content_start for chunk in self._chunks), default=0),
+            metadata_count=0,
+            schema_count=len(self._schemas),
+        )
         groups = [
             (Opcode.SCHEMA, [_record_bytes(schema) for schema in self._schemas.values()]),
             (Opcode.CHANNEL, [_record_bytes(channel) for channel in self._channels]),
-            (Opcode.STATISTICS, [_record_bytes(self._statistics())]),
+            (Opcode.STATISTICS, [_record_bytes(statistics)]),
             (Opcode.CHUNK_INDEX, [chunk.record() for chunk in self._chunks]),
             (Opcode.ATTACHMENT_INDEX, [_record_bytes(index) for index in self._attachments]),
         ]
@@ -246,20 +257,6 @@ class ContainerWriter:
         # The CRC covers the summary and the footer up to the CRC itself.
         crc = zlib.crc32(summary + offsets + footer[:-4])
         self._write_bytes(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
-
-    def _statistics(self) -> Statistics:
-        """Return the statistics record of the summary: counts and times of the log."""
-        return Statistics(
-            attachment_count=len(self._attachments),
-            channel_count=len(self._channels),
-            channel_message_counts=dict(sorted(self._counts.items())),
-            chunk_count=len(self._chunks),
-            message_count=self._counts.total(),
-            message_end_time=max((chunk.content_end for chunk in self._chunks), default=0),
-            message_start_time=min((chunk.content_start for chunk in self._chunks), default=0),
-            metadata_count=0,
-            schema_count=len(self._schemas),
-        )
 
     def flush(self) -> None:
         """Pass the written bytes to the operating system. Raises OSError."""

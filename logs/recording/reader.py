@@ -250,22 +250,15 @@ class _MessageCollector:
                 schema = Schema.read(record_stream(data[start:end]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
-                self._add_channel(Channel.read(record_stream(data[start:end])))
+                channel = Channel.read(record_stream(data[start:end]))
+                kind = (channel.topic, self._schemas.get(channel.schema_id, ""))
+                if channel.id not in self._channels and kind == (STATE_TOPIC, STATE_NAME):
+                    # The channel of the track's rows.
+                    if self._matcher is not None:
+                        raise ValueError("two state channels")
+                    self._state_channel, self._matcher = channel.id, RowMatcher(channel.id)
+                self._channels.setdefault(channel.id, kind)
             position = end
-
-    def _add_channel(self, channel: Channel) -> None:
-        """Register a channel, and prepare to read the track's rows if it is the state channel.
-
-        Raises ValueError for a second state channel.
-        """
-        if channel.id in self._channels:
-            return
-        self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))
-        if self._channels[channel.id] == (STATE_TOPIC, STATE_NAME):
-            if self._matcher is not None:
-                raise ValueError("two state channels")
-            self._state_channel = channel.id
-            self._matcher = RowMatcher(channel.id)
 
     def _add_message(self, data: bytes, position: int, start: int, end: int) -> int:
         """Collect the message at ``position`` of the data, and return the position of the next record.
@@ -336,15 +329,20 @@ def read_log(path: Path | str) -> FlightLog:
         fault = row_fault or container.problem or "an empty log"
         raise LogError(f"{path}: contains no complete second of flight: {fault}", file=path)
     end_reason, result_fault = _read_result(container.attachments, len(rows))
-    verdict, verdict_fault = _read_verdict(container.attachments)
+    verdict: dict[str, Any] | None = None
+    verdict_fault = ""
+    if VERDICT_FILE in container.attachments:
+        verdict = _parse_object(container.attachments[VERDICT_FILE]) or None
+        verdict_fault = "" if verdict else f"{VERDICT_FILE} is not a JSON object"
     reference, reference_fault = _read_reference(container.attachments)
     loss = row_fault or container.problem
     is_recovered = not loss and RECOVERY_FILE in container.attachments
-    loss = (
-        _recorded_loss(container.attachments[RECOVERY_FILE])
-        if is_recovered
-        else loss or result_fault or verdict_fault or reference_fault
-    )
+    loss = loss or result_fault or verdict_fault or reference_fault
+    if is_recovered:
+        recorded_loss = _parse_object(container.attachments[RECOVERY_FILE]).get("lost")
+        loss = "the extent of the loss is unknown"
+        if isinstance(recorded_loss, str) and recorded_loss:
+            loss = recorded_loss
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
@@ -409,23 +407,6 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
     if data.get("rows") != row_count:
         return end_reason, f"the log contains {row_count} of {data.get('rows')} rows"
     return end_reason, ""
-
-
-def _recorded_loss(recovery: bytes) -> str:
-    """Return the description of the lost part from the recovery note of a log.
-
-    recovery: content of the note, in JSON.
-    """
-    loss = _parse_object(recovery).get("lost")
-    return loss if isinstance(loss, str) and loss else "the extent of the loss is unknown"
-
-
-def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
-    """Return the recorded verdict (None without one), and the fault of its attachment ("" if none)."""
-    if VERDICT_FILE not in attachments:
-        return None, ""
-    verdict = _parse_object(attachments[VERDICT_FILE])
-    return (verdict, "") if verdict else (None, f"{VERDICT_FILE} is not a JSON object")
 
 
 def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:

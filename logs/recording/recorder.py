@@ -33,7 +33,6 @@ from logs.recording.mcap_writer import (
     ChannelIndex,
     ChunkContent,
     ContainerWriter,
-    Layout,
     MessageRecords,
     last_log_time,
     lay_out_chunks,
@@ -278,7 +277,10 @@ class Recorder:
             end = max(self._last_ns, EPOCH_NS)
             self._write_messages([*self._poses.whole_track_records(end)])
             if returns is not None:
-                self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
+                # With the log time of the start, viewers show the scene during the whole flight.
+                update = scene.returns_scene(EPOCH_NS, returns, self._terrain)
+                self._write_messages([single_record(self._add_scene_channel(RETURNS_TOPIC), EPOCH_NS, update)])
+                self._writer.flush()
             if reference is not None:
                 self._write_attachment(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
             if verdict is not None:
@@ -293,13 +295,37 @@ class Recorder:
             self._close_file()
 
     def _open_file(self, setup: FlightSetup) -> None:
-        """Open the file, replacing it, and write the setup."""
+        """Open the file, replacing it, and write the setup: its attachments, all channels, and its static scenes."""
         attachments = pack_setup(setup)
         self._file = self._path.open("wb", buffering=_BUFFER_BYTES)
         try:
             # A thinned log should take little time: faster compression takes half the time for a quarter more bytes.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if self._every == 1 else -1)
-            self._write_setup(attachments, setup)
+            for name, data in attachments.items():
+                self._write_attachment(name, data, EPOCH_NS)
+            self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())
+            for topic, kind in _CHANNELS.items():
+                descriptor = kind.DESCRIPTOR
+                schema = file_descriptor_set(descriptor)
+                self._channels[topic] = self._writer.add_channel(topic, descriptor.full_name, schema)
+            scenes = {
+                "/scene/terrain": scene.terrain_scene(EPOCH_NS, setup.scenario),
+                "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats, setup.scenario.terrain),
+                "/scene/plan": scene.plan_scene(EPOCH_NS, setup.display_waypoints, setup.route.items.tolist()),
+                "/scene/aircraft": aircraft_scene(EPOCH_NS),
+                "/points/terrain": clouds.ground_cloud(EPOCH_NS, setup.scenario),
+                "/points/threats": clouds.threats_cloud(EPOCH_NS, setup.scenario.threats),
+                "/points/plan": clouds.plan_cloud(EPOCH_NS, setup.display_waypoints),
+                "/points/aircraft": clouds.aircraft_cloud(EPOCH_NS),
+            }
+            scenario_with_fence = with_fence_zones(setup).scenario
+            if scenario_with_fence.zones:
+                self._add_scene_channel(ZONES_TOPIC)
+                scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, scenario_with_fence, setup.route.positions)
+            self._write_messages(
+                [single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()]
+            )
+            self._writer.flush()
         except OSError:
             self._file.close()
             raise
@@ -307,43 +333,11 @@ class Recorder:
         self._flight_events = FlightEvents(setup, self._channels[EVENT_TOPIC])
         self._is_open = True
 
-    def _write_setup(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
-        """Write the attachments, all channels, and the static scenes and point clouds of the setup."""
-        for name, data in attachments.items():
-            self._write_attachment(name, data, EPOCH_NS)
-        self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())
-        for topic, kind in _CHANNELS.items():
-            descriptor = kind.DESCRIPTOR
-            self._channels[topic] = self._writer.add_channel(
-                topic, descriptor.full_name, file_descriptor_set(descriptor)
-            )
-        scenes = {
-            "/scene/terrain": scene.terrain_scene(EPOCH_NS, setup.scenario),
-            "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats, setup.scenario.terrain),
-            "/scene/plan": scene.plan_scene(EPOCH_NS, setup.display_waypoints, setup.route.items.tolist()),
-            "/scene/aircraft": aircraft_scene(EPOCH_NS),
-            "/points/terrain": clouds.ground_cloud(EPOCH_NS, setup.scenario),
-            "/points/threats": clouds.threats_cloud(EPOCH_NS, setup.scenario.threats),
-            "/points/plan": clouds.plan_cloud(EPOCH_NS, setup.display_waypoints),
-            "/points/aircraft": clouds.aircraft_cloud(EPOCH_NS),
-        }
-        scenario_with_fence = with_fence_zones(setup).scenario
-        if scenario_with_fence.zones:
-            self._add_scene_channel(ZONES_TOPIC)
-            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, scenario_with_fence, setup.route.positions)
-        self._write_messages([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
-        self._writer.flush()
-
     def _add_scene_channel(self, topic: str) -> int:
         """Add a channel for scene updates on an optional topic, and return the channel's number."""
         descriptor = SceneUpdate.DESCRIPTOR
         self._channels[topic] = self._writer.add_channel(topic, descriptor.full_name, file_descriptor_set(descriptor))
         return self._channels[topic]
-
-    def _add_scene(self, topic: str, update: bytes) -> None:
-        """Write a scene with the log time of the start, so that viewers show it during the whole flight."""
-        self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
-        self._writer.flush()
 
     def _close_file(self) -> None:
         """Write pending rows and events, the summary and the end of the file, and release its lock."""
@@ -386,29 +380,25 @@ class Recorder:
         layout = lay_out_chunks(
             as_bytes(encoded), log_times, channel, other_messages, self._writer.pop_new_records(), CHUNK_SIZE
         )
-        for content in _chunk_contents(layout):
+        # Cut the bytes of the layout into its chunks, each with its message indexes.
+        records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
+        # Lists are faster than arrays here: reading a field of one chunk from an array takes a microsecond.
+        bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
+        offsets = layout.channels["offset"].tolist()
+        messages = layout.channels["messages"].tolist()
+        for k in range(len(layout.chunks)):
+            content = ChunkContent(
+                records=records[bounds["start"][k] : bounds["stop"][k]],
+                index=index[bounds["index_start"][k] : bounds["index_stop"][k]],
+                channels=tuple(
+                    ChannelIndex(channel, offset, count)
+                    for channel, (offset, count) in enumerate(zip(offsets[k], messages[k], strict=True))
+                    if count
+                ),
+                start=bounds["first_ns"][k],
+                end=bounds["last_ns"][k],
+            )
             self._writer.write_chunk(content)
-
-
-def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
-    """Cut the bytes of a layout into its chunks, and yield each chunk with its message indexes."""
-    records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    # Lists are faster than arrays here: reading a field of one chunk from an array takes a microsecond.
-    bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
-    offsets = layout.channels["offset"].tolist()
-    messages = layout.channels["messages"].tolist()
-    for k in range(len(layout.chunks)):
-        yield ChunkContent(
-            records=records[bounds["start"][k] : bounds["stop"][k]],
-            index=index[bounds["index_start"][k] : bounds["index_stop"][k]],
-            channels=tuple(
-                ChannelIndex(channel, offset, count)
-                for channel, (offset, count) in enumerate(zip(offsets[k], messages[k], strict=True))
-                if count
-            ),
-            start=bounds["first_ns"][k],
-            end=bounds["last_ns"][k],
-        )
 
 
 def thin_track(track: Track, every: int) -> Track:

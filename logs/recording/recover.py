@@ -48,7 +48,11 @@ def recover_log(path: Path) -> RecoveredLog | None:
     log = read_log(path)
     if log.complete:
         return None
-    container, chunks = _intact_chunks(path)
+    # The attachments and the chunks that precede the first damage.
+    container = Container()
+    with path.open("rb") as log_file:
+        log_file.seek(len(MAGIC))
+        chunks = list(read_chunks(log_file, container))
     file = io.BytesIO()
     writer = ContainerWriter(file, PROFILE)
     for name, data in container.attachments.items():
@@ -66,11 +70,3 @@ def recover_log(path: Path) -> RecoveredLog | None:
     writer.write_attachment(RECOVERY_FILE, media_type(RECOVERY_FILE), text, writer.last_time)
     writer.write_end()
     return RecoveredLog(file.getvalue(), log)
-
-
-def _intact_chunks(path: Path) -> tuple[Container, list[bytes]]:
-    """Return the attachments (in a `Container`) and the chunks of a log that precede its first damage."""
-    container = Container()
-    with path.open("rb") as file:
-        file.seek(len(MAGIC))
-        return container, list(read_chunks(file, container))

@@ -4,6 +4,7 @@
 are written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
 """
 
+import contextlib
 import functools
 import hashlib
 import json
@@ -336,8 +337,12 @@ class StoredSetup:
 
 @functools.cache
 def _cached_versions() -> tuple[tuple[str, str], ...]:
-    """Return names and versions of the packages, which are looked up only once."""
-    return tuple(_find_versions().items())
+    """Return the versions of Python and of the installed packages of `_PACKAGES`, which are looked up only once."""
+    versions = [("python", platform.python_version())]
+    for name in _PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            versions.append((name, metadata.version(name)))
+    return tuple(versions)
 
 
 def package_versions() -> dict[str, str]:
@@ -350,17 +355,6 @@ def package_versions() -> dict[str, str]:
     True
     """
     return dict(_cached_versions())
-
-
-def _find_versions() -> dict[str, str]:
-    """Look up the versions of Python and of the installed packages of `_PACKAGES`."""
-    versions = {"python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return versions
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:

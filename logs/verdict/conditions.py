@@ -164,24 +164,6 @@ def condition_lines(conditions: Conditions) -> list[str]:
             if conditions.aircraft_named
             else f"{line}; no aircraft was named, so this is the default (name yours with --aircraft)"
         )
-    return [aircraft_line, _world_line(conditions)]
-
-
-def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
-    """Return a line of text that names the autopilot.
-
-    is_flown: True if the autopilot flew, False if only a mission is judged.
-    """
-    return f"{'Flown by' if is_flown else 'Autopilot'}: {conditions.autopilot}"
-
-
-def flown_lines(conditions: Conditions) -> list[str]:
-    """Return the lines on a flight's aircraft, its conditions and the autopilot that flew."""
-    return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
-
-
-def _world_line(conditions: Conditions) -> str:
-    """Return the line on wind, turbulence, navigation, terrain and the number of zones."""
     wind_text = "no wind"
     if conditions.wind_mps is None:
         wind_text = "wind from every direction in turn"
@@ -207,7 +189,21 @@ def _world_line(conditions: Conditions) -> str:
         else f"terrain {conditions.terrain}, heights above {conditions.height_datum}"
     )
     zones_text = f"; {count_text(conditions.zones, 'zone')}" if conditions.zones else ""
-    return f"Conditions: {wind_text}{turbulence_text}{navigation_text}; {terrain_text}{zones_text}"
+    world_line = f"Conditions: {wind_text}{turbulence_text}{navigation_text}; {terrain_text}{zones_text}"
+    return [aircraft_line, world_line]
+
+
+def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
+    """Return a line of text that names the autopilot.
+
+    is_flown: True if the autopilot flew, False if only a mission is judged.
+    """
+    return f"{'Flown by' if is_flown else 'Autopilot'}: {conditions.autopilot}"
+
+
+def flown_lines(conditions: Conditions) -> list[str]:
+    """Return the lines on a flight's aircraft, its conditions and the autopilot that flew."""
+    return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
 
 
 # Largest angle between the lines of two legs that lie side by side.

@@ -163,7 +163,16 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
             )
         )
     findings.append(_infeasible_finding(plan))
-    lines = _plan_lines(findings, plan, conditions)
+    failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
+    headline_text, further_lines = headline(findings, flyable=False), []
+    if failed:
+        text = ", ".join(f"{finding.rule} ({finding.reason})" for finding in failed)
+        headline_text = f"not flyable: no feasible plan was found: {text}"
+        further_lines = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
+    condition_texts = (
+        [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]
+    )
+    lines = (headline_text, *condition_texts, *further_lines)
     return Verdict(tuple(findings), flyable=False, complete=False, lines=lines, level="plan", conditions=conditions)
 
 
@@ -176,17 +185,3 @@ def _infeasible_finding(plan: Plan) -> Finding:
     return make_finding(
         "completion", PLAN, ok=False, reason=fault.text, faults=[fault], source="plan", method="certificate"
     )
-
-
-def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
-    """Return the summary lines of a run without a feasible plan, the headline first."""
-    failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
-    headline_text, further_lines = headline(findings, flyable=False), []
-    if failed:
-        text = ", ".join(f"{finding.rule} ({finding.reason})" for finding in failed)
-        headline_text = f"not flyable: no feasible plan was found: {text}"
-        further_lines = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
-    condition_texts = (
-        [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]
-    )
-    return (headline_text, *condition_texts, *further_lines)

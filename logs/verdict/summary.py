@@ -23,7 +23,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
-from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, TAKE_OFF_RULES, RuleWords
+from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, TAKE_OFF_RULES
 from logs.verdict.suggestions import home_height, home_height_text, lowest_clearance
 from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
@@ -73,9 +73,15 @@ def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[s
     setup_notes: notes from the function `setup_notes`.
     """
     if flyable:
-        unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        unjudged = []
+        for rule in RULE_WORDS.values():
+            rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.unjudged]
+            if count := sum(finding.ok is None for finding in rule_findings):
+                count_suffix = f" on {count} {rule.unjudged_unit}{'s' if count > 1 else ''}"
+                places_text = count_suffix if count < len(rule_findings) else ""
+                unjudged.append(f"{rule.unjudged} not judged{places_text}")
         unjudged += ["return not judged"] if any(finding.check == NO_HOME for finding in findings) else []
-        notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
+        notes = [*unjudged, *_near_miss_notes(findings), *_altitude_notes(findings)]
         return "; ".join(["flyable", *notes, *setup_notes])
     failed_findings = _failed_by_urgency(findings)
     if not failed_findings and (reason := undecided_text(findings)):
@@ -85,7 +91,7 @@ def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[s
     unnamed_count = len(failed_findings) - len(named_findings)
     text = (
         "not flyable: "
-        + ", ".join(_headline_phrase(item) for item in named_findings)
+        + ", ".join(RULE_WORDS[item.rule].phrase(RULE_WORDS[item.rule].word, item) for item in named_findings)
         + (f" and {unnamed_count} more" if unnamed_count else "")
     )
     return "; ".join([text, *setup_notes])
@@ -212,17 +218,6 @@ def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
     return sorted(failed, key=lambda finding: (-RULE_WORDS[finding.rule].urgency, order[finding.rule]))
 
 
-def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
-    """Describe the number of a rule's findings that were not judged; return "" if all were judged."""
-    rule_findings = [finding for finding in findings if finding.rule == rule.name]
-    unjudged_count = sum(finding.ok is None for finding in rule_findings)
-    if not unjudged_count:
-        return ""
-    if unjudged_count == len(rule_findings):
-        return f"{rule.unjudged} not judged"
-    return f"{rule.unjudged} not judged on {unjudged_count} {rule.unjudged_unit}{'s' if unjudged_count > 1 else ''}"
-
-
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     """Return a note on a missile's range and on a zone's limit that the path missed by less than navigation may err."""
     notes = []
@@ -288,12 +283,6 @@ def _headline_findings(failed: list[Finding]) -> list[Finding]:
     return [failed[k] for k in sorted(chosen_indices, key=lambda k: (rules.index(rules[k]), margins[k] >= 0.0, k))]
 
 
-def _headline_phrase(finding: Finding) -> str:
-    """Return the headline's phrase for a failed finding, such as "slope on leg 0 (14.5° > 14.2°)"."""
-    rule = RULE_WORDS[finding.rule]
-    return rule.phrase(rule.word, finding)
-
-
 def summary_lines(
     findings: Sequence[Finding],
     setup: FlightSetup,
@@ -315,11 +304,25 @@ def summary_lines(
         if finding.ok is False
     ):
         lines += _airframe_or_autopilot_lines(levels, deciding, setup)
-    lines += _pitch_limit_lines(findings, setup)
+    # The failed leg with the longest time at the pitch limit.
+    failed_places = {finding.place for finding in findings if finding.ok is False}
+    pitch_times = [
+        (fact.value, finding.place)
+        for finding in findings
+        for fact in finding.facts
+        if fact.what == PITCH_LIMIT_TIME and finding.place in failed_places
+    ]
+    if pitch_times:
+        time, place = max(pitch_times, key=lambda pair: pair[0])
+        limit_name = setup.autopilot.speeds.max_pitch_name
+        lines.append(f"Pitch: at its limit {limit_name} for {time:.0f} s on {place_text(place)}")
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, is_flown=level == "flown")]
     lines += _parameter_lines(setup, is_flown=level == "flown")
-    lines += _ignored_settings_lines(setup)
+    rtl_settings, parameters = setup.scenario.returns, setup.autopilot.parameters
+    is_stated = rtl_settings is not None and rtl_settings.rtl_autoland is not None
+    if is_stated and parameters is not None and not hasattr(parameters, "rtl_autoland"):
+        lines.append(f"Not used: rtl_autoland of [returns], for which {setup.autopilot.title} has no parameter")
     lines += [f"Not judged: {text}" for _, text in unjudged_parts(findings, setup)]
     # These are limits of PX4 and not of the aircraft, so they decide nothing for another autopilot.
     lines += [
@@ -404,22 +407,6 @@ def _airframe_or_autopilot_lines(
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
-def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line on the failed leg with the longest time at the pitch limit; [] without one."""
-    failed_places = {finding.place for finding in findings if finding.ok is False}
-    times = [
-        (fact.value, finding.place)
-        for finding in findings
-        for fact in finding.facts
-        if fact.what == PITCH_LIMIT_TIME and finding.place in failed_places
-    ]
-    if not times:
-        return []
-    time, place = max(times, key=lambda pair: pair[0])
-    limit_name = setup.autopilot.speeds.max_pitch_name
-    return [f"Pitch: at its limit {limit_name} for {time:.0f} s on {place_text(place)}"]
-
-
 def _misspelling_lines(parameters: ParameterSet) -> list[str]:
     """Return a line for each name in the parameter file that looks like a misspelled parameter name.
 
@@ -483,19 +470,6 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
         f" {counts['default']} from {setup.autopilot.title}'s defaults{notes}",
         *contradictions,
     ]
-
-
-def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Return a line if the scenario's rtl_autoland has no effect on the autopilot, otherwise []."""
-    rtl_settings, parameters = setup.scenario.returns, setup.autopilot.parameters
-    if (
-        rtl_settings is None
-        or rtl_settings.rtl_autoland is None
-        or parameters is None
-        or hasattr(parameters, "rtl_autoland")
-    ):
-        return []
-    return [f"Not used: rtl_autoland of [returns], for which {setup.autopilot.title} has no parameter"]
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:

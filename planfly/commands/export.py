@@ -14,6 +14,13 @@ from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
 from planfly.terminal.options import add_fence_option, add_result_options, add_time_option
 from planfly.terminal.output import print_warnings, write_json_if_requested
 
+# Kinds of content of exported files by their suffixes; other files contain missions.
+_CONTENT_KINDS = {
+    **dict.fromkeys((".kml", ".gpx"), "map"),
+    ".parm": "settings",
+    **dict.fromkeys((".csv", ".parquet", ".tlog", ".ulg"), "flight"),
+}
+
 
 def add_export_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly export``."""
@@ -77,7 +84,8 @@ def export(args: argparse.Namespace) -> int:
     result = exporting.export(args.source, *args.files, **options)
     print_warnings(result.notes)
     for file, content in zip(result.files, result.contents, strict=True):
-        print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")
+        kind = _CONTENT_KINDS.get(file.suffix.lower(), "mission")
+        print(f"{kind:<9} {file} ({content})")
     code = INCOMPLETE if result.loss else FLYABLE
 
     def json_answer() -> object:
@@ -91,12 +99,3 @@ def export(args: argparse.Namespace) -> int:
 
     write_json_if_requested(args, json_answer)
     return code
-
-
-def _content_kind(suffix: str) -> str:
-    """Return the kind of content of a file with the given suffix."""
-    if suffix in (".kml", ".gpx"):
-        return "map"
-    if suffix == ".parm":
-        return "settings"
-    return "flight" if suffix in (".csv", ".parquet", ".tlog", ".ulg") else "mission"

@@ -102,7 +102,15 @@ def plan(args: argparse.Namespace) -> int:
     """Plan a path, and write the plan file; return 4 if the plan is not safe, or fails in its flights."""
     from planfly.api import planning
 
-    _check_replanning(args)
+    # The options for planning in flight are allowed only together.
+    if args.old is None:
+        for option in ("at_leg", "threats"):
+            if (value := getattr(args, option)) is not None:
+                allowed = "allowed only with `old` PLAN.json, the plan that is being flown"
+                raise ScenarioError.of_argument(option, value, allowed, shown="")
+    elif args.at_leg is None:
+        allowed = "`at_leg` K is missing; it names the leg that is flown next"
+        raise ScenarioError.of_argument("old", args.old, allowed, shown="")
     check_flights_option(args, "front")
     if args.front is not None:
         return _plan_front(args)
@@ -214,18 +222,6 @@ def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
         yield lambda: is_interrupted
     finally:
         signal.signal(signal.SIGINT, previous_handler)
-
-
-def _check_replanning(args: argparse.Namespace) -> None:
-    """Raise ScenarioError if only some of the options for planning in flight are given."""
-    if args.old is None:
-        for name in ("at_leg", "threats"):
-            if (value := getattr(args, name)) is not None:
-                allowed = "allowed only with `old` PLAN.json, the plan that is being flown"
-                raise ScenarioError.of_argument(name, value, allowed, shown="")
-    elif args.at_leg is None:
-        allowed = "`at_leg` K is missing; it names the leg that is flown next"
-        raise ScenarioError.of_argument("old", args.old, allowed, shown="")
 
 
 def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> None:

@@ -40,7 +40,13 @@ def report(args: argparse.Namespace) -> int:
     from planfly.api import reporting
 
     if args.layout:
-        return _write_layout(args)
+        if args.log is not None:
+            message = f"{args.log}: --layout writes only the layout; name no log with it"
+            raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
+        layout = reporting.foxglove_layout(args.layout, overwrite=args.overwrite)
+        print(f"layout    {layout}")
+        write_json_if_requested(args, lambda: _json_answer([layout], verdict=None, code=FLYABLE))
+        return FLYABLE
     if args.log is None:
         print("planfly report: expected a log, or --layout FILE (see planfly report --help)", file=sys.stderr)
         return BAD_INPUT
@@ -70,16 +76,3 @@ def _json_answer(files: Sequence[Path], verdict: "Verdict | None", code: int) ->
 
     document = None if verdict is None else verdict.document()
     return ReportAnswer(exit_code=code, files=[str(file) for file in files], verdict=document)
-
-
-def _write_layout(args: argparse.Namespace) -> int:
-    """Write the layout file for Foxglove.  Raises PlanflyError if a log is named, too."""
-    from planfly.api import reporting
-
-    if args.log is not None:
-        message = f"{args.log}: --layout writes only the layout; name no log with it"
-        raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
-    file = reporting.foxglove_layout(args.layout, overwrite=args.overwrite)
-    print(f"layout    {file}")
-    write_json_if_requested(args, lambda: _json_answer([file], verdict=None, code=FLYABLE))
-    return FLYABLE

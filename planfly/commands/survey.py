@@ -92,7 +92,13 @@ def survey(args: argparse.Namespace) -> int:
         settings = [f" --params {quote(str(path))}" for path in result.files if path.suffix == ".param"]
         params_option = settings[0] if missions[0].stem == "parameter" and settings else ""
         # The suggested missions consist of plain items, which hold no camera.
-        camera_option = "" if args.camera is not None else _camera_option(result)
+        camera = next((overlap.camera for overlap in result.overlaps if overlap is not None), None)
+        camera_option = ""
+        if args.camera is None and camera is not None:
+            # State a camera with a focal length of 10 mm and the same footprint.
+            camera_option = f" --camera {10.0 * camera.across:.4g}x{10.0 * camera.along:.4g},10"
+            if camera.front is not None and camera.side is not None:
+                camera_option += f",{100.0 * camera.front:g},{100.0 * camera.side:g}"
         next_line = (
             f"next      planfly survey {quote(str(missions[0]))}{params_option}{camera_option} with the same options,"
             " as it was flown"
@@ -100,18 +106,6 @@ def survey(args: argparse.Namespace) -> int:
         print(colour_text(next_line, "hint"))
     write_json_if_requested(args, lambda: _json_answer(str(args.what), result, code))
     return code
-
-
-def _camera_option(result: "SurveyResult") -> str:
-    """Return the option that states the camera of a .plan's survey, or "" if no camera is known."""
-    camera = next((overlap.camera for overlap in result.overlaps if overlap is not None), None)
-    if camera is None:
-        return ""
-    # State a camera with a focal length of 10 mm and the same footprint.
-    text = f" --camera {10.0 * camera.across:.4g}x{10.0 * camera.along:.4g},10"
-    if camera.front is None or camera.side is None:
-        return text
-    return f"{text},{100.0 * camera.front:g},{100.0 * camera.side:g}"
 
 
 def _json_answer(source: str, result: "SurveyResult", code: int) -> object:

@@ -40,7 +40,26 @@ def verdict_lines(
     """
     lines = [colour_text(verdict.headline, STATE_STYLES[verdict.state]), *verdict.details]
     for rule in verdict.failed_rules:
-        lines += _failed_lines(rule)
+        # The worst finding, its suggestion or else that of another finding, and the other failed places.
+        worst_finding, *other_findings = rule.failed
+        place_text = finding_heading(worst_finding)
+        if other_findings:
+            place_text = (
+                f"{rule.words.word}: {len(rule.failed)} of {rule.judged} places fail; the worst is at"
+                f" {worst_finding.where}"
+            )
+        lines.append(colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}")
+        if worst_finding.suggestions:
+            lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
+        elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):
+            helped_text = f"at {helped_finding.where}: {helped_finding.suggestion}"
+            lines.append(colour_text("          would pass: ", "hint") + helped_text)
+        elif worst_finding.rule == "return" and worst_finding.limit_source == "scenario":
+            lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
+        if other_findings:
+            other_places = "; ".join(finding.place_and_value for finding in other_findings[:_MAX_LISTED])
+            more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
+            lines.append(f"          also at {other_places}{more_text}")
     no_change_text = _no_change_text(verdict, setup)
     lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
     undecided = verdict.undecided_findings
@@ -81,32 +100,6 @@ def _no_change_text(verdict: Verdict, setup: FlightSetup | None) -> str:
     if setup is not None and has_geometric_suggestion(setup):
         text += "; planfly check --geometry suggests changes for the planned route"
     return text
-
-
-def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Return the lines for a failed rule: its worst finding, a suggestion, and the other failed places.
-
-    The suggestion is that of the worst finding, or else of another finding.
-    """
-    worst_finding, *other_findings = rule.failed
-    place_text = finding_heading(worst_finding)
-    if other_findings:
-        place_text = (
-            f"{rule.words.word}: {len(rule.failed)} of {rule.judged} places fail; the worst is at {worst_finding.where}"
-        )
-    lines = [colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}"]
-    if worst_finding.suggestions:
-        lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
-    elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):
-        helped_text = f"at {helped_finding.where}: {helped_finding.suggestion}"
-        lines.append(colour_text("          would pass: ", "hint") + helped_text)
-    elif worst_finding.rule == "return" and worst_finding.limit_source == "scenario":
-        lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
-    if other_findings:
-        other_places = "; ".join(finding.place_and_value for finding in other_findings[:_MAX_LISTED])
-        more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
-        lines.append(f"          also at {other_places}{more_text}")
-    return lines
 
 
 def _rule_summary(rule: RuleFindings) -> str:

@@ -137,19 +137,6 @@ def item_moves(context: MissionContext, before: Mission, after: Mission) -> tupl
     return tuple(moves)
 
 
-def _approach_indices(mission: Mission) -> frozenset[int]:
-    """Return the indices of the items of landing sequences.
-
-    A sequence begins at its DO_LAND_START, or else with the last position before the landing.
-    """
-    indices: set[int] = set()
-    for landing in (index for index, item in enumerate(mission.items) if item.command in LANDINGS):
-        starts = [index for index in range(landing) if mission.items[index].command == Command.DO_LAND_START]
-        positions = [index for index in movable_indices(mission) if index < landing]
-        indices.update(range((starts or positions or [landing])[-1], landing + 1))
-    return frozenset(indices)
-
-
 @dataclass(frozen=True, slots=True)
 class _Choice:
     """Choice of the items to move for one suggestion.
@@ -180,7 +167,14 @@ class _EditedMission:
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
         self.requirements, self.choice = judged.requirements, choice
         self.is_changed = False
-        self.approach_indices = _approach_indices(judged.mission)
+        # Items of landing sequences: a sequence begins at its DO_LAND_START, or else with the last position before the
+        # landing.
+        items, indices = judged.mission.items, set[int]()
+        for landing in (index for index, item in enumerate(items) if item.command in LANDINGS):
+            starts = [index for index in range(landing) if items[index].command == Command.DO_LAND_START]
+            positions = [index for index in movable_indices(judged.mission) if index < landing]
+            indices.update(range((starts or positions or [landing])[-1], landing + 1))
+        self.approach_indices = frozenset(indices)
         # Offset of each moved item so far, east, north and up, m, by its index.
         self.offsets: dict[int, Floats] = {}
 
@@ -439,31 +433,23 @@ def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Fin
             scale = (change.wanted + _SPHERE_MARGIN_M) / max(float(distance[waypoint]), 1.0)
             edited.move_items([waypoint], np.array([*(scale * offsets[waypoint]), 0.0]))
         return
-    direction, leg, fraction = _nearest_point(missile, points[:, :2], legs)
+    # The point on the legs that is nearest to the missile, and the direction from the missile to it.
+    candidates = []
+    for leg in legs:
+        start, step = points[leg, :2], points[leg + 1, :2] - points[leg, :2]
+        fraction = float(np.clip((missile - start) @ step / max(float(step @ step), 1.0), 0.0, 1.0))
+        from_missile = start + fraction * step - missile
+        candidates.append((math.hypot(*from_missile), leg, fraction, from_missile))
+    nearest_distance, leg, fraction, direction = min(candidates, key=lambda candidate: candidate[0])
+    if nearest_distance < 1.0:
+        # The missile is on the leg: move perpendicular to the leg.
+        step = points[leg + 1, :2] - points[leg, :2]
+        direction, nearest_distance = np.array([-step[1], step[0]]), max(math.hypot(*step), 1.0)
+    direction = direction / nearest_distance
     # The nearest point moves by this share of the waypoints' move.
     share = (1.0 - fraction) * (leg in waypoints) + fraction * (leg + 1 in waypoints)
     offset = (change.wanted + _SPHERE_MARGIN_M) / max(share, _MIN_MOVE_SHARE) * direction
     edited.move_items(waypoints, np.array([*offset, 0.0]))
-
-
-def _nearest_point(position: Floats, points: Floats, legs: Sequence[int]) -> tuple[Floats, int, float]:
-    """Find the point on the legs that is nearest to a position (2,).
-
-    points: waypoints of the route, (w, 2) m.
-    Returns the direction from the position to this point (2,), a unit vector, the leg, and the fraction of the leg's
-    length before the point.  If the position is on the leg, the direction is perpendicular to the leg.
-    """
-    candidates = []
-    for leg in legs:
-        step = points[leg + 1] - points[leg]
-        fraction = float(np.clip((position - points[leg]) @ step / max(float(step @ step), 1.0), 0.0, 1.0))
-        offset = points[leg] + fraction * step - position
-        candidates.append((math.hypot(*offset), leg, fraction, offset))
-    distance, leg, fraction, offset = min(candidates, key=lambda candidate: candidate[0])
-    if distance < 1.0:
-        step = points[leg + 1] - points[leg]
-        offset, distance = np.array([-step[1], step[0]]), max(math.hypot(*step), 1.0)
-    return offset / distance, leg, fraction
 
 
 def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> None:

@@ -127,8 +127,14 @@ class MissionContext:
         item_indices = movable_indices(mission)
         position = int(np.searchsorted(item_indices, index))
         nearby = item_indices[max(0, position - 2) : position + 3]
-        points = self._planned_positions(mission, nearby)
-        uav = self.uav
+        # A planned item states its altitude AMSL; a landing has the altitude of the item before it.
+        origin, near_items, uav = self.scenario.origin, [mission.items[k] for k in nearby], self.uav
+        east, north = to_map(origin, [item.lat_deg for item in near_items], [item.lon_deg for item in near_items])
+        altitudes = [item.alt for item in near_items]
+        for k, item in enumerate(near_items):
+            if item.command in LANDINGS and k:
+                altitudes[k] = altitudes[k - 1]
+        points = np.stack([east, north, altitudes], axis=1)
         radii = acceptance_radii(self.scenario, points, uav.airspeed, uav.max_bank, uav.limits.tracking)
         items = list(mission.items)
         for k, radius in zip(nearby, radii.tolist(), strict=True):
@@ -139,21 +145,6 @@ class MissionContext:
                 params = items[k].params
                 items[k] = replace(items[k], params=(params[0], radius, *params[2:]))
         return replace(mission, items=tuple(items))
-
-    def _planned_positions(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
-        """Return the positions of planned items, (n, 3) m AMSL.
-
-        A landing has the altitude of the item before it.
-
-        indices: indices of the items in the mission.
-        """
-        items = [mission.items[k] for k in indices]
-        east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
-        altitudes = [item.alt for item in items]
-        for k, item in enumerate(items):
-            if item.command in LANDINGS and k:
-                altitudes[k] = altitudes[k - 1]
-        return np.stack([east, north, altitudes], axis=1)
 
     # ------------------------------------------------------------------
     # Verdicts.

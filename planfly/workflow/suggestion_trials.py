@@ -118,22 +118,18 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
     return pairs
 
 
-def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
-    """Return True if a finding could not be fully judged before a change, because the flight ended early."""
-    has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
-    return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
-
-
 def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
     """Return the findings that a change makes worse: they fail, or are no longer decided or judged.
 
     A finding that was not judged before, because the flight ended early, is left out.
     """
-    return [
-        finding
-        for old, finding in _newly_open_findings(old_verdict, new_verdict)
-        if not _was_unreached(old_verdict, old) and (finding.ok is False or old is None or old.ok is not False)
-    ]
+    has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
+    worsened = []
+    for old, finding in _newly_open_findings(old_verdict, new_verdict):
+        was_unreached = has_ended_early and (old is None or old.ok is None or old.place == FLIGHT)
+        if not was_unreached and (finding.ok is False or old is None or old.ok is not False):
+            worsened.append(finding)
+    return worsened
 
 
 def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
@@ -162,18 +158,15 @@ def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> b
     A slope passes only if the altitude error on its leg becomes clearly smaller.
     """
     new_finding = _worst_findings(new_verdict).get(finding_key(finding))
-    if new_finding is not None and (new_finding.ok is not True or _keeps_height_error(finding, new_finding)):
-        return False
+    if new_finding is not None:
+        old_error, new_error = (
+            next((abs(fact.value) for fact in one.facts if fact.what == "height error"), 0.0)
+            for one in (finding, new_finding)
+        )
+        keeps_height_error = new_error > max(HEIGHT_ERROR_LIMIT_M, MAX_HEIGHT_ERROR_SHARE * old_error)
+        if new_finding.ok is not True or keeps_height_error:
+            return False
     return not worsened_findings(old_verdict, new_verdict)
-
-
-def _keeps_height_error(old_finding: Finding, new_finding: Finding) -> bool:
-    """Return True if a leg is flown at about the same wrong altitude before and after a change."""
-    old_error, new_error = (
-        next((abs(fact.value) for fact in finding.facts if fact.what == "height error"), 0.0)
-        for finding in (old_finding, new_finding)
-    )
-    return new_error > max(HEIGHT_ERROR_LIMIT_M, MAX_HEIGHT_ERROR_SHARE * old_error)
 
 
 @dataclass(frozen=True)
@@ -196,31 +189,28 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
     trials_by_finding: dict[int, list[PassedTrial]] = {}
     for trial in passed_trials:
         trials_by_finding.setdefault(id(trial.finding), []).append(trial)
-    return tuple(
-        TriedSuggestions(trials[0].finding.rule, trials[0].finding.place, _smallest_moves(trials))
-        for trials in trials_by_finding.values()
-    )
-
-
-def _smallest_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
-    """Return the trials' suggestions, the smallest moves first; if all are far moves, only one."""
-    suggestions = sorted((trial.suggestion for trial in trials), key=_move_distance)
-    near_moves = [
-        suggestion
-        for suggestion in suggestions
-        if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _item_moves(suggestion))
-    ]
-    return tuple(near_moves or suggestions[:1])
+    tried = []
+    for trials in trials_by_finding.values():
+        # Sorted by the largest move of an item, m; 0 if the suggestion moves no item.
+        suggestions = sorted(
+            (trial.suggestion for trial in trials),
+            key=lambda suggestion: max(
+                (math.hypot(move.east, move.north, move.up) for move in _item_moves(suggestion)), default=0.0
+            ),
+        )
+        near_moves = [
+            suggestion
+            for suggestion in suggestions
+            if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _item_moves(suggestion))
+        ]
+        finding = trials[0].finding
+        tried.append(TriedSuggestions(finding.rule, finding.place, tuple(near_moves or suggestions[:1])))
+    return tuple(tried)
 
 
 def _item_moves(suggestion: Suggestion) -> list[ItemMove]:
     """Return the moves of items of a suggestion that passed its trial."""
     return [move for change in suggestion for move in change.moves]
-
-
-def _move_distance(suggestion: Suggestion) -> float:
-    """Return the largest move of an item, m; 0 if the suggestion moves no item."""
-    return max((math.hypot(move.east, move.north, move.up) for move in _item_moves(suggestion)), default=0.0)
 
 
 def judge_mission_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
@@ -275,9 +265,18 @@ class SuggestionTrials:
 
         A suggestion is left out if a part of its changes passes by itself. Its moves are the fewest that are enough.
         """
+        # The failed findings with suggestions, the worst of each rule first, the most urgent rules first; none if the
+        # mission has too many legs or too many such findings.
+        findings_by_rule = [
+            [finding for finding in rule.failed if finding.suggestions] for rule in self.judged.verdict.failed_rules
+        ]
+        ranked = [(rank, finding) for rule in findings_by_rule for rank, finding in enumerate(rule)]
+        if self.judged.requirements.legs > MAX_TRIED_LEGS or len(ranked) > _MAX_FAILED_FINDINGS:
+            ranked = []
+        ranked = sorted(ranked, key=lambda ranked_finding: ranked_finding[0])[:MAX_TRIED_FINDINGS]
         requests = [
             (number, rank, finding)
-            for rank, finding in enumerate(self._findings_to_try())
+            for rank, (_, finding) in enumerate(ranked)
             for number in range(len(finding.suggestions))
         ]
         passed_trials: list[PassedTrial] = []
@@ -287,26 +286,13 @@ class SuggestionTrials:
                     continue
                 passed_trial = self.try_suggestion(finding, number)
                 passed_trials += [] if passed_trial is None else [passed_trial]
+            # The smallest part of a suggestion's moves that passes, or the whole; single moves are tried first, then
+            # pairs and so on, with the flights that are left.
             for index, trial in enumerate(passed_trials):
-                passed_trials[index] = self._with_fewest_moves(trial)
+                parts = self._parts(trial.finding, trial.suggestion)
+                passed_trials[index] = self._first_passing(trial.finding, parts, _MAX_TRIED_PARTS) or trial
         return [
             trial for trial in passed_trials if not _has_passing_part(passed_trials, trial.finding, trial.suggestion)
-        ]
-
-    def _findings_to_try(self) -> list[Finding]:
-        """Return the failed findings to try, the worst of each rule first, the most urgent rules first.
-
-        Only findings with suggestions are tried.  Return [] if the mission has too many legs or too many such findings.
-        """
-        findings_by_rule = [
-            [finding for finding in rule.failed if finding.suggestions] for rule in self.judged.verdict.failed_rules
-        ]
-        is_too_long = self.judged.requirements.legs > MAX_TRIED_LEGS
-        if is_too_long or sum(map(len, findings_by_rule)) > _MAX_FAILED_FINDINGS:
-            return []
-        ranked = [(rank, finding) for rule in findings_by_rule for rank, finding in enumerate(rule)]
-        return [
-            finding for _, finding in sorted(ranked, key=lambda ranked_finding: ranked_finding[0])[:MAX_TRIED_FINDINGS]
         ]
 
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
@@ -339,33 +325,28 @@ class SuggestionTrials:
         )
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
 
-    def _with_fewest_moves(self, whole: PassedTrial) -> PassedTrial:
-        """Return the trial of the smallest part of a suggestion's moves that passes; the whole if no part does.
-
-        Single moves are tried first, then pairs and so on, with the flights that are left.
-        """
-        parts = self._parts(whole.finding, whole.suggestion)
-        return self._first_passing(whole.finding, parts, _MAX_TRIED_PARTS) or whole
-
     def _parts(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield the parts of a suggestion's moves, the smallest first, each with its trial."""
-        moves = _item_moves(suggestion)
+        moves, items = _item_moves(suggestion), self.judged.setup.route.items.tolist()
         if len(moves) < 2 or not {change.what for change in suggestion} <= _PART_KINDS:
             return
         for count in range(1, len(moves)):
             for part in combinations(moves, count):
                 if all(change.place.kind in ("leg", "waypoint") for change in suggestion):
-                    smaller = tuple(self._raised_waypoint(suggestion, move) for move in part)
+                    # A change of a waypoint's altitude for each item that the suggestion for legs moves.
+                    smaller = tuple(
+                        replace(
+                            suggestion[-1],
+                            place=self.judged.requirements.waypoint(items.index(move.item)),
+                            wanted=round(abs(move.up), 2),
+                            moves=(move,),
+                        )
+                        for move in part
+                    )
                 else:
                     smaller = (*suggestion[:-1], replace(suggestion[-1], moves=part))
                 with suppress(PlanflyError):
                     yield smaller, self._trial(finding, smaller)
-
-    def _raised_waypoint(self, suggestion: Suggestion, move: ItemMove) -> Change:
-        """Return the change of a waypoint's altitude that a suggestion for legs makes to its item."""
-        waypoint = self.judged.setup.route.items.tolist().index(move.item)
-        place = self.judged.requirements.waypoint(waypoint)
-        return replace(suggestion[-1], place=place, wanted=round(abs(move.up), 2), moves=(move,))
 
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
         """Return True if a trial passes by geometry, and by a flight if the judged flight reached the finding's place.
@@ -419,11 +400,15 @@ class SuggestionTrials:
             failed_value = max(suggested_parameters(suggestion).values(), default=0.0)
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
-            if larger_suggestion is not None:
-                larger_suggestion = self._with_present_lengths(larger_suggestion)
             if larger_suggestion is None:
                 return
-            suggestion = larger_suggestion
+            # The current lengths of legs are those of the unchanged mission.
+            suggestion = tuple(
+                replace(change, current=float(self.judged.requirements.runs[change.place.index]))
+                if change.what == "length" and change.place.index is not None
+                else change
+                for change in larger_suggestion
+            )
 
     def _with_least_parameter(self, finding: Finding, suggestion: Suggestion, failed_value: float) -> Suggestion:
         """Return a suggestion with the smallest value of its parameters that passes by geometry.
@@ -463,16 +448,6 @@ class SuggestionTrials:
         parameters = tuple(suggested_parameters(suggestion).items())
         key = mission.items, mission.home, setup.battery, setup.scenario.launch, parameters
         return self._trials.setdefault(key, Trial(setup, self.context.uav.aircraft, self.should_abort))
-
-    def _with_present_lengths(self, suggestion: Suggestion) -> Suggestion:
-        """Return a suggestion whose current leg lengths are those of the unchanged mission."""
-        runs = self.judged.requirements.runs
-        return tuple(
-            replace(change, current=float(runs[change.place.index]))
-            if change.what == "length" and change.place.index is not None
-            else change
-            for change in suggestion
-        )
 
     def _changed_flight(self, finding: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
         """Apply a suggestion, and return the changed mission and setup.
