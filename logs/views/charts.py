@@ -22,6 +22,10 @@ LabelRank = Literal["fail", "end", "number", "name"]
 # Number of blocks that a series is thinned to; each block keeps its lowest and highest row.
 BLOCKS = 600
 
+# Names of the layer of waypoints, by the number that is shown at each.
+NUMBERED_WAYPOINT = "waypoint, numbered"
+NUMBERED_ITEM = "waypoint, with the number of its mission item"
+
 
 @dataclass(frozen=True, slots=True)
 class Layer:

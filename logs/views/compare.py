@@ -47,6 +47,7 @@ def make_two_flights_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
         winds=[NamedWind(first_wind)] if first_wind == second_wind else winds,
         verdict=None,
         stops=first.setup.route.stops.tolist(),
+        items=first.setup.route.items.tolist(),
     )
 
 

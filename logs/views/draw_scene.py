@@ -10,6 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from flight.mission.itinerary import NO_ITEM
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
@@ -380,7 +381,7 @@ def _draw_labels(
     If there are too many waypoints, only every n-th and the failed ones are numbered.  Entered threats get the best
     places.
     """
-    corners, stops = projection.project(route), setup.route.stops.tolist()
+    corners, items = projection.project(route), setup.route.items.tolist()
     last = len(route) - 1
 
     def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
@@ -388,13 +389,13 @@ def _draw_labels(
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
     # The same words as on the map.
-    write(f"{stops[0]} start", corners[0], "end")
-    write(f"{stops[last]} destination", corners[last], "end")
-    stop_starts = stop_rows(stops)
+    for k, name in ((0, "start"), (last, "destination")):
+        write(name if items[k] == NO_ITEM else f"{items[k]} {name}", corners[k], "end")
+    stop_starts = stop_rows(setup.route.stops.tolist())
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
-    for k in sorted(numbered_waypoints - {0, last}):
-        write(str(stops[k]), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
+    for k in sorted(k for k in numbered_waypoints - {0, last} if items[k] != NO_ITEM):
+        write(str(items[k]), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
     threats = setup.scenario.threats
     failing_threats = failed.threat_names()
     labels = list(zip(threats.names, projection.project(threats.position), strict=True))

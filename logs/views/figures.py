@@ -86,7 +86,7 @@ class FigureEntry:
 
 
 def _make_path_arguments(subject: Subject) -> dict[str, Any]:
-    """Return keyword arguments for `flight_map` and `profile_chart`: plan, route, track, verdict, stops."""
+    """Return keyword arguments for `flight_map` and `profile_chart`: plan, route, track, verdict, stops, items."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -94,6 +94,7 @@ def _make_path_arguments(subject: Subject) -> dict[str, Any]:
         "track": subject.track,
         "verdict": subject.verdict,
         "stops": subject.setup.route.stops.tolist(),
+        "items": subject.setup.route.items.tolist(),
     }
 
 

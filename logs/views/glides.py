@@ -49,7 +49,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
         scenario,
         "without its engine",
         layers,
-        [*labels, *end_labels(scenario, route, setup.route.stops.tolist())],
+        [*labels, *end_labels(scenario, route, setup.route.items.tolist())],
         extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

@@ -62,7 +62,7 @@ def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], populatio
         scenario,
         "ground risk",
         layers,
-        [*labels, *end_labels(scenario, route, setup.route.stops.tolist())],
+        [*labels, *end_labels(scenario, route, setup.route.items.tolist())],
         extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

@@ -174,7 +174,7 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         scenario,
         f"the radio link along the path, and at {drawn.coverage.height.text}",
         layers,
-        [label, *end_labels(scenario, route, setup.route.stops.tolist())],
+        [label, *end_labels(scenario, route, setup.route.items.tolist())],
         drawn.extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flight.mission.itinerary import NO_ITEM
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import Json, Label, Layer, Panel, numbers, panel_json, shorten
+from logs.views.charts import NUMBERED_ITEM, NUMBERED_WAYPOINT, Json, Label, Layer, Panel, numbers, panel_json, shorten
 from logs.views.failures import failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
@@ -85,6 +86,7 @@ def flight_map(
     verdict: Verdict | None,
     waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
+    items: Sequence[int] | None = None,
 ) -> MapChart:
     """Make the map of a plan, or of its flight.
 
@@ -95,7 +97,9 @@ def flight_map(
     plan_waypoints: waypoints of the plan, m, (p, 3), or None.
     route_waypoints: waypoints of the flown route, m, (w, 3); None for a plan alone.
     waypoint_texts: text of the page on each waypoint.
-    stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
+    stops: number of the stop of each waypoint of the route; None if each waypoint is a stop.
+    items: number of the mission item of each waypoint, which is displayed; `NO_ITEM` displays no number.  None to
+        display the numbers of the stops.
     """
     return map_chart(
         scenario,
@@ -107,6 +111,7 @@ def flight_map(
         verdict=verdict,
         waypoint_texts=waypoint_texts,
         stops=stops,
+        items=items,
     )
 
 
@@ -121,6 +126,7 @@ def map_chart(
     verdict: Verdict | None,
     waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
+    items: Sequence[int] | None = None,
 ) -> MapChart:
     """Make a map as `flight_map` does, with any number of tracks and winds.
 
@@ -161,20 +167,23 @@ def map_chart(
         dot_role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
         texts = tuple(waypoint_texts[k] for k in stop_starts) if waypoint_texts else ()
         east, north, _ = route[stop_starts].T
-        layers.append(Layer("dots", "waypoint, numbered", dot_role, east, north, hover_texts=texts))
+        name = NUMBERED_WAYPOINT if items is None else NUMBERED_ITEM
+        layers.append(Layer("dots", name, dot_role, east, north, hover_texts=texts))
         if failed.waypoints:
             east, north, _ = route[list(failed.waypoints)].T
             layers.append(Layer("rings", "waypoint that fails a rule", "fail", east, north, quiet=True))
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += make_fail_labels(failed, route[:, :2], centres)
-    labels += end_labels(scenario, route, stops)
+    labels += end_labels(scenario, route, stops if items is None else items)
     if route is not None:
         # At most `_MAX_NUMBERS` waypoints are numbered, and all that fail a rule, except start and destination.
         step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
         numbered = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
+        shown_numbers = stops if items is None else items
         labels += [
-            Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
+            Label(str(shown_numbers[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
             for k in sorted(numbered - {0, len(route) - 1})
+            if shown_numbers[k] != NO_ITEM
         ]
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
     return scenario_map(
@@ -281,18 +290,18 @@ def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Flo
     return ("start", first), ("destination", last)
 
 
-def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -> list[Label]:
+def end_labels(scenario: Scenario, route: Floats | None, numbers_of_waypoints: Sequence[int]) -> list[Label]:
     """Return the labels of start and destination, with the numbers of their waypoints.
 
     Returns one label if start and destination coincide.
 
-    stops: number of each waypoint of the route.
+    numbers_of_waypoints: displayed number of each waypoint of the route; `NO_ITEM` for none.
     """
     ends = _name_ends(scenario, route)
-    numbers_of_ends = ("", "") if route is None else (stops[0], stops[-1])
+    numbers_of_ends = (NO_ITEM, NO_ITEM) if route is None else (numbers_of_waypoints[0], numbers_of_waypoints[-1])
     start, destination = (
-        Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
-        for (name, point), stop in zip(ends, numbers_of_ends, strict=True)
+        Label(name if number == NO_ITEM else f"{number} {name}", float(point[0]), float(point[1]), "end")
+        for (name, point), number in zip(ends, numbers_of_ends, strict=True)
     )
     # One marker is enough for both ends if they lie within 50 m horizontally.
     are_close = float(np.hypot(*(ends[0][1][:2] - ends[1][1][:2]))) < 50.0

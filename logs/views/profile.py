@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flight.mission.itinerary import NO_ITEM
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import Chart, Label, Layer, Panel, find_outline_rows, shorten
+from logs.views.charts import NUMBERED_ITEM, NUMBERED_WAYPOINT, Chart, Label, Layer, Panel, find_outline_rows, shorten
 from logs.views.failures import (
     Failures,
     failures,
@@ -41,6 +42,7 @@ def profile_chart(
     track: Track | None,
     verdict: Verdict | None,
     stops: Sequence[int] | None = None,
+    items: Sequence[int] | None = None,
     above_ground: Floats | None = None,
 ) -> Chart:
     """Chart altitudes (m AMSL) over the distance along the route (km).
@@ -50,6 +52,7 @@ def profile_chart(
     at the progress of the flight along the route, which never decreases.
 
     stops: number of each waypoint, (w,), shown at the first of those with the same number; None numbers all waypoints.
+    items: number of the mission item of each waypoint, shown in place of its stop; see `logs.views.map.flight_map`.
     above_ground: height above ground at the end of each leg, m, (w,), as in `flight.mission.route.Route`; None if no
         leg follows the terrain.
 
@@ -93,8 +96,9 @@ def profile_chart(
     if not is_straight_line:
         role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
         positions = kilometres[stop_starts], route[stop_starts, 2]
-        layers.append(Layer("dots", "waypoint, numbered", role, *positions, quiet=True))
-        labels = _make_waypoint_labels(waypoint_distances, route, stops, failed)
+        name = NUMBERED_WAYPOINT if items is None else NUMBERED_ITEM
+        layers.append(Layer("dots", name, role, *positions, quiet=True))
+        labels = _make_waypoint_labels(waypoint_distances, route, stops, stops if items is None else items, failed)
     if failed.waypoints:
         rows = list(failed.waypoints)
         layers.append(
@@ -249,15 +253,19 @@ def _make_flown_layers(
 
 
 def _make_waypoint_labels(
-    waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures
+    waypoint_distances: Floats, route: Floats, stops: Sequence[int], numbers: Sequence[int], failed: Failures
 ) -> list[Label]:
-    """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule."""
+    """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
+
+    numbers: displayed number of each waypoint; `NO_ITEM` for none.
+    """
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0 or n == len(stop_starts) - 1} | set(
         failed.waypoints
     )
     return [
-        Label(str(stops[k]), float(waypoint_distances[k]) / 1000.0, float(route[k, 2]), "number", "waypoint")
+        Label(str(numbers[k]), float(waypoint_distances[k]) / 1000.0, float(route[k, 2]), "number", "waypoint")
         for k in sorted(numbered_waypoints)
+        if numbers[k] != NO_ITEM
     ]

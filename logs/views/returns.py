@@ -156,7 +156,7 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
         scenario,
         "returns to launch from points along the route",
         layers,
-        [*labels, *end_labels(scenario, route, setup.route.stops.tolist())],
+        [*labels, *end_labels(scenario, route, setup.route.items.tolist())],
         extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

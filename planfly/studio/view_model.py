@@ -28,7 +28,7 @@ from planfly.studio.incremental_verdict import Window
 from planfly.studio.states import PlaceStates, State, place_states
 from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.mission_context import JudgedMission
-from world.airspace.zones_on_map import zone_rings
+from world.airspace.zones_on_map import zone_rings, zone_walls
 from world.arrays import Floats
 from world.scenario import Scenario
 
@@ -38,6 +38,8 @@ Json = dict[str, Any]
 _PROFILE_SAMPLES = 500
 # Maximum number of findings that are listed.
 _MAX_LISTED_FINDINGS = 60
+# Height of the wall of a zone without a ceiling above the highest waypoint, m.
+_WALL_MARGIN_M = 50.0
 # Maximum number of zones and threats whose cross-sections the profile shows.
 _MAX_CUTS = 120
 _OK_STATE = State("ok")
@@ -76,6 +78,9 @@ def world_json(context: EditContext, setup: FlightSetup) -> Json:
     threats = scenario.threats
     # First the zones of the scenario, then those of the mission's fence: findings number the zones in this order.
     zones = judged_airspace(setup).zones if mission.fences else scenario.zones
+    # A wall in the 3-D view reaches from the floor or the ground to the ceiling, or above the route without a ceiling.
+    altitudes = setup.route.positions[:, 2]
+    lowest, highest = float(altitudes.min()), float(altitudes.max()) + _WALL_MARGIN_M
     return {
         "name": scenario.name,
         "origin": [scenario.origin.lat_deg, scenario.origin.lon_deg],
@@ -98,7 +103,12 @@ def world_json(context: EditContext, setup: FlightSetup) -> Json:
             )
         ],
         "zones": [
-            {"name": zone_text(zone), "kind": zone.kind, "rings": [round_to_json(ring) for ring in zone_rings(zone)]}
+            {
+                "name": zone_text(zone),
+                "kind": zone.kind,
+                "rings": [round_to_json(ring) for ring in zone_rings(zone)],
+                "walls": [round_to_json(wall) for wall in zone_walls(zone, scenario.terrain, lowest, highest)],
+            }
             for zone in zones
         ],
     }

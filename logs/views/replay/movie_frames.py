@@ -74,6 +74,7 @@ class MovieFrames:
                 track=None,
                 verdict=None,
                 stops=setup.route.stops.tolist(),
+                items=setup.route.items.tolist(),
             )
         )
         axes = figure.axes[0]

@@ -130,6 +130,7 @@ export class Scene {
   drawWay(pen) {
     const { model, flown, grid } = this.now, colours = { ok: "planned", near: "commanded", open: "quiet", fail: "fail" };
     pen.lineCap = pen.lineJoin = "round";
+    for (const zone of this.now.world.zones) this.walls(pen, zone);
     for (const threat of this.now.world.threats) if (threat.kill) this.ball(pen, threat);
     pen.strokeStyle = this.colour("pole");
     pen.lineWidth = 0.8;
@@ -161,6 +162,25 @@ export class Scene {
     pen.fill();
     pen.globalAlpha = 0.55;
     pen.stroke();
+    pen.globalAlpha = 1;
+  }
+
+  // The walls of a zone: each has a lower and an upper end at each corner.
+  walls(pen, { kind, walls }) {
+    pen.strokeStyle = pen.fillStyle = this.colour(kind === "inclusion" ? "stay-in" : "zone");
+    pen.lineWidth = 1.2;
+    for (const wall of walls) {
+      const ends = [...wall, wall[0]].map((corner) => corner.map((end) => this.point(...end)));
+      pen.globalAlpha = kind === "inclusion" ? 0.04 : 0.13;
+      for (let k = 1; k < ends.length; k++) {
+        pen.beginPath();
+        pen.moveTo(...ends[k - 1][0].slice(0, 2));
+        for (const end of [ends[k - 1][1], ends[k][1], ends[k][0]]) pen.lineTo(end[0], end[1]);
+        pen.fill();
+      }
+      pen.globalAlpha = 0.8;
+      for (const edge of [0, 1]) this.line(pen, [...wall, wall[0]].map((corner) => corner[edge]));
+    }
     pen.globalAlpha = 1;
   }
 
