@@ -108,10 +108,7 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
             raise StoreError(f"{path}: no flight of this campaign was flown", file=path)
     # Flights that both campaigns have are paired, unless the draws of any of them differ.
     _, *pairs = np.intersect1d(tables[0]["flight"], tables[1]["flight"], return_indices=True)
-    if not all(
-        np.array_equal(*(table[name][rows] for table, rows in zip(tables, pairs, strict=True)))
-        for name in ("seed", *NAMES)
-    ):
+    if not all(np.array_equal(tables[0][name][pairs[0]], tables[1][name][pairs[1]]) for name in ("seed", *NAMES)):
         pairs = [np.empty(0, dtype=np.intp)] * 2
     flyable = np.column_stack([table["outcome"][rows] == "flyable" for table, rows in zip(tables, pairs, strict=True)])
     compared_rows = pairs if len(flyable) else [np.arange(len(table["flight"])) for table in tables]

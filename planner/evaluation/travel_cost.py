@@ -177,7 +177,10 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
     columns = [np.interp(table.amsl, table.amsl[is_known], rows[is_known, k]) for k in range(5)]
     for column in columns:
         column.setflags(write=False)
-    return TravelCost(0.0, 0.0, float(table.airspeed / columns[0][0]), *columns, winds)
+    levels, linears, squares, min_sines, max_sines = columns
+    return TravelCost(
+        0.0, 0.0, float(table.airspeed / levels[0]), levels, linears, squares, min_sines, max_sines, winds
+    )
 
 
 class LegTime(NamedTuple):

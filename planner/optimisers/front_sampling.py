@@ -143,7 +143,7 @@ class FrontSampling:
         is_moving_variable = (is_moving_point[:, :, None] & is_moving_coordinate).reshape(count, -1)
         samples[is_in_block] += fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[rows])
         # Noise along a few of the given directions for each sample, with the scale of its kind times a random factor.
-        count, direction_count = np.count_nonzero(is_noisy), len(self._directions)
+        count, direction_count = int(np.count_nonzero(is_noisy)), len(self._directions)
         directions_per_sample = min(MAX_DIRECTIONS, direction_count)
         picked_directions = rng.integers(direction_count, size=(count, directions_per_sample))
         factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(MIN_EXPONENT, MAX_EXPONENT, (count, 1)))
