@@ -138,9 +138,16 @@ class Predictor:
             )
             self.trims[start_row:end_row] = offsets
         residual = required - modelled - self.trims
-        self.filters = (
-            [_best_filter(residual[:, axis], signals) for axis in range(3)] if filters is None else list(filters)
-        )
+        self.filters = [] if filters is None else list(filters)
+        candidates = [
+            GustFilter(float(np.exp(-1.0 / (signals.hertz * gust_time))), gain)
+            for gust_time in _GUST_TIMES_S
+            for gain in _FILTER_GAINS
+        ]
+        for column in residual.T if filters is None else ():
+            # The filter of each axis leaves the smallest innovations.
+            variances = [float((column - candidate.estimate(column, signals)).var()) for candidate in candidates]
+            self.filters.append(candidates[int(np.argmin(variances))])
         self._unmodelled = np.column_stack(
             [gust_filter.estimate(residual[:, axis], signals) for axis, gust_filter in enumerate(self.filters)]
         )
@@ -302,19 +309,6 @@ class Predictor:
         sine, cosine = np.sin(flow.alpha), np.cos(flow.alpha)
         forward = per_mass * (lift * sine - drag * cosine) + thrust / base.mass
         return forward, per_mass * side, -per_mass * (lift * cosine + drag * sine)
-
-
-def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
-    """Return the filter of an axis that leaves the smallest innovations.
-
-    residual: angular accelerations about the axis that are not explained, (n,).
-    """
-    filters = [
-        GustFilter(float(np.exp(-1.0 / (signals.hertz * gust_time))), gain)
-        for gust_time in _GUST_TIMES_S
-        for gain in _FILTER_GAINS
-    ]
-    return min(filters, key=lambda gust_filter: float((residual - gust_filter.estimate(residual, signals)).var()))
 
 
 def whiteness(innovations: Floats, lags: int) -> float:

@@ -117,9 +117,29 @@ def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> L
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
     """Encode the ground of the area as a coloured mesh with up to `MAX_VERTICES` vertices per side."""
-    entity = _entity(time_ns, "terrain")
-    mesh = b"" if scenario.terrain is None else _encode_mesh(scenario.terrain, scenario.bounds)
-    return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
+    entity = _entity(time_ns, "terrain").SerializeToString(deterministic=True)
+    if scenario.terrain is None:
+        return length_delimited(2, entity)
+    corner_points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
+    if not is_known.any():
+        return length_delimited(2, entity)
+    up = corner_points[..., 2]
+    vertex_numbers = np.arange(up.size).reshape(up.shape)
+    sw = vertex_numbers[:-1, :-1]
+    se = vertex_numbers[:-1, 1:]
+    nw = vertex_numbers[1:, :-1]
+    ne = vertex_numbers[1:, 1:]
+    corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
+    has_known_corners = is_known.ravel()[corners].all(axis=1)
+    mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
+    mesh.indices.extend(corners[has_known_corners].ravel().tolist())
+    points = corner_points.reshape(-1, 3)
+    # Round to 2^-4 m and 2^-7 of a colour.  The mesh is only displayed, and thus takes a quarter of the bytes.
+    rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
+    body = mesh.SerializeToString(deterministic=True)
+    body += repeated_submessages(_MESH_POINTS, _XYZ, np.round(points * 16.0) / 16.0)
+    body += repeated_submessages(_MESH_COLOURS, _RGBA, rgba)
+    return length_delimited(2, entity + length_delimited(_ENTITY_TRIANGLES, body))
 
 
 def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -151,30 +171,6 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
         return np.zeros((0, 3)), np.zeros((0, 3))
     points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
     return points[is_known], colours[is_known]
-
-
-def _encode_mesh(terrain: Terrain, bounds: Floats) -> bytes:
-    """Encode the ground as the triangles field of its entity; b"" if no ground is known."""
-    corner_points, colours, is_known = _terrain_mesh(terrain, bounds)
-    if not is_known.any():
-        return b""
-    up = corner_points[..., 2]
-    vertex_numbers = np.arange(up.size).reshape(up.shape)
-    sw = vertex_numbers[:-1, :-1]
-    se = vertex_numbers[:-1, 1:]
-    nw = vertex_numbers[1:, :-1]
-    ne = vertex_numbers[1:, 1:]
-    corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
-    has_known_corners = is_known.ravel()[corners].all(axis=1)
-    mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
-    mesh.indices.extend(corners[has_known_corners].ravel().tolist())
-    points = corner_points.reshape(-1, 3)
-    # Round to 2^-4 m and 2^-7 of a colour.  The mesh is only displayed, and thus takes a quarter of the bytes.
-    rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
-    body = mesh.SerializeToString(deterministic=True)
-    body += repeated_submessages(_MESH_POINTS, _XYZ, np.round(points * 16.0) / 16.0)
-    body += repeated_submessages(_MESH_COLOURS, _RGBA, rgba)
-    return length_delimited(_ENTITY_TRIANGLES, body)
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:

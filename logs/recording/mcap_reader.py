@@ -66,56 +66,46 @@ def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
     file: file positioned after the magic at its start.
     """
-    try:
-        yield from _read_sections(file, container)
-    except _Damage as damage:
-        container.problem = str(damage)
-
-
-def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
-    """Yield the records of the file, chunk by chunk, up to its end record, and collect its attachments.
-
-    Records outside chunks are yielded in pieces. Raises _Damage where the file is damaged.
-    """
     crc = zlib.crc32(MAGIC)
     total = 0
-    has_end = is_checked = False
+    is_checked = False
     loose_records = bytearray()
-    while True:
-        position = file.tell()
-        frame, content = _read_record(file, position)
-        opcode = frame[0]
-        if loose_records and (opcode not in _OUTSIDE_CHUNKS or len(loose_records) >= _PIECE_BYTES):
-            yield bytes(loose_records)
-            loose_records.clear()
-        if opcode in _OUTSIDE_CHUNKS:
-            if not is_checked:
-                _check_data_section(file, crc, position)
-                is_checked = True
-            loose_records += frame + content
-        elif opcode == Opcode.CHUNK:
-            data = _read_chunk(content, position)
-            total += len(data)
-            if total > RECORD_LIMIT + _MAX_GROWTH_RATIO * file.tell():
-                raise _Damage(
-                    f"chunks grow to {total:,} bytes at byte {position:,} of the file:"
-                    f" more than {_MAX_GROWTH_RATIO}-fold"
-                )
-            yield data
-        elif opcode == Opcode.ATTACHMENT:
-            _read_attachment(content, position, container)
-        elif opcode == Opcode.DATA_END:
-            _check_data_end(content, position, crc)
-            has_end = True
-            break
-        elif opcode == Opcode.FOOTER:
-            break
-        elif opcode == 0:
-            raise _Damage(f"the record at byte {position:,} has no type")
-        crc = zlib.crc32(content, zlib.crc32(frame, crc))
-    if not has_end:
-        raise _Damage("the data section has no end record")
-    _check_summary(file)
+    try:
+        while True:
+            position = file.tell()
+            frame, content = _read_record(file, position)
+            opcode = frame[0]
+            # Records outside chunks are yielded in pieces.
+            if loose_records and (opcode not in _OUTSIDE_CHUNKS or len(loose_records) >= _PIECE_BYTES):
+                yield bytes(loose_records)
+                loose_records.clear()
+            if opcode in _OUTSIDE_CHUNKS:
+                if not is_checked:
+                    _check_data_section(file, crc, position)
+                    is_checked = True
+                loose_records += frame + content
+            elif opcode == Opcode.CHUNK:
+                data = _read_chunk(content, position)
+                total += len(data)
+                if total > RECORD_LIMIT + _MAX_GROWTH_RATIO * file.tell():
+                    raise _Damage(
+                        f"chunks grow to {total:,} bytes at byte {position:,} of the file:"
+                        f" more than {_MAX_GROWTH_RATIO}-fold"
+                    )
+                yield data
+            elif opcode == Opcode.ATTACHMENT:
+                _read_attachment(content, position, container)
+            elif opcode == Opcode.DATA_END:
+                _check_data_end(content, position, crc)
+                break
+            elif opcode == Opcode.FOOTER:
+                raise _Damage("the data section has no end record")
+            elif opcode == 0:
+                raise _Damage(f"the record at byte {position:,} has no type")
+            crc = zlib.crc32(content, zlib.crc32(frame, crc))
+        _check_summary(file)
+    except _Damage as damage:
+        container.problem = str(damage)
 
 
 def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
@@ -186,8 +176,14 @@ def _read_chunk(content: bytes, position: int) -> bytes:
         raise _Damage(
             f"the chunk at byte {position:,} is compressed with {chunk.compression[:20]!r}: expected zstd, lz4 or none"
         )
+    data = chunk.data
     try:
-        data = _decompress(chunk, size)
+        # Decompress at most `size` + 1 bytes: decompress() would trust the size that the compressed data declare.
+        if chunk.compression == "zstd":
+            decompressor = zstandard.ZstdDecompressor(max_window_size=2**27)
+            data = decompressor.stream_reader(data, read_across_frames=True).read(size + 1)
+        elif chunk.compression == "lz4" and data:
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
         raise _Damage(f"the chunk at byte {position:,} cannot be decompressed") from error
     if len(data) != size:
@@ -195,20 +191,6 @@ def _read_chunk(content: bytes, position: int) -> bytes:
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise _Damage(f"the chunk at byte {position:,} is damaged (its CRC differs)")
     return data
-
-
-def _decompress(chunk: Chunk, size: int) -> bytes:
-    """Decompress at most `size` + 1 bytes of a chunk.
-
-    The library's decompress() would trust the size that the compressed data declare.
-    """
-    if chunk.compression == "zstd":
-        reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
-        return reader.read(size + 1)
-    if chunk.compression == "lz4" and chunk.data:
-        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
-        return data
-    return chunk.data
 
 
 def _read_attachment(content: bytes, position: int, container: Container) -> None:

@@ -577,22 +577,8 @@ def lay_out_chunks(
     """
     max_channel = max([row_channel, *(messages.channel for messages in other_messages)])
     blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in other_messages)])
-    merged, firsts = _merge_by_time(
-        row_times, rows.shape[1], row_channel, _message_entries(other_messages), len(prefix), limit
-    )
-    if not len(merged):
-        no_bytes = np.zeros(0, np.uint8)
-        return Layout(no_bytes, no_bytes, np.zeros(0, CHUNK), np.zeros((0, max_channel + 1), CHANNEL_INDEX))
-    records = _copy_messages(merged, rows, blob, np.frombuffer(prefix, np.uint8))
-    index, chunks, channels = _index_messages(merged, firsts, len(prefix), max_channel)
-    return Layout(records, index, chunks, channels)
-
-
-def _message_entries(other_messages: list[MessageRecords]) -> Entries:
-    """Return the entries (`ENTRY`) of messages in order of time, with their starts in the joined blobs.
-
-    The field `offset`, the start in the chunk, is not set.
-    """
+    # The entries of the messages by time, with their starts in the joined blobs; `offset`, the start in the chunk, is
+    # set later.
     entries: Entries = np.zeros(sum(len(messages.log_times) for messages in other_messages), dtype=ENTRY)
     first, start = 0, 0
     for messages in other_messages:
@@ -603,7 +589,14 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
         added_entries["log_time"] = messages.log_times
         first += len(added_entries)
         start += len(messages.blob)
-    return entries[np.argsort(entries["log_time"], kind="stable")]
+    entries = entries[np.argsort(entries["log_time"], kind="stable")]
+    merged, firsts = _merge_by_time(row_times, rows.shape[1], row_channel, entries, len(prefix), limit)
+    if not len(merged):
+        no_bytes = np.zeros(0, np.uint8)
+        return Layout(no_bytes, no_bytes, np.zeros(0, CHUNK), np.zeros((0, max_channel + 1), CHANNEL_INDEX))
+    records = _copy_messages(merged, rows, blob, np.frombuffer(prefix, np.uint8))
+    index, chunks, channels = _index_messages(merged, firsts, len(prefix), max_channel)
+    return Layout(records, index, chunks, channels)
 
 
 @compiled

@@ -244,9 +244,23 @@ class _MessageCollector:
             if opcode == 0:
                 raise ValueError("a record without a type")
             if opcode == Opcode.MESSAGE:
-                position = self._add_message(data, position, start, end)
-                continue
-            if opcode == Opcode.SCHEMA:
+                channel_number, _, log_time, _ = _MESSAGE.unpack_from(data, start)
+                if channel_number == self._state_channel and self._matcher is not None:
+                    # Collect a state row together with all state rows that follow it directly.
+                    matched = self._matcher.match(data, position)
+                    if len(matched):
+                        end = position + len(matched) * RECORD.itemsize
+                    else:
+                        matched = parse_row(data[start + MESSAGE_HEADER : end], self._parser)
+                    self.parts.append(matched)
+                elif self._channels.get(channel_number) == (EVENT_TOPIC, LOG_NAME):
+                    message = Log.FromString(data[start + MESSAGE_HEADER : end])
+                    # Skip events that the recorder derives from the rows.
+                    if message.name != FLIGHT_EVENT_SOURCE:
+                        # Subtract integers first, because a float cannot represent ns since 1970 exactly.
+                        time = (log_time - EPOCH_NS) / 1e9
+                        self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))
+            elif opcode == Opcode.SCHEMA:
                 schema = Schema.read(record_stream(data[start:end]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
@@ -259,30 +273,6 @@ class _MessageCollector:
                     self._state_channel, self._matcher = channel.id, RowMatcher(channel.id)
                 self._channels.setdefault(channel.id, kind)
             position = end
-
-    def _add_message(self, data: bytes, position: int, start: int, end: int) -> int:
-        """Collect the message at ``position`` of the data, and return the position of the next record.
-
-        A state row is collected together with all state rows that follow it directly. Events that the recorder derives
-        from the rows, and messages of other channels, are skipped.
-
-        start, end: range of the record's content in the data.
-        """
-        channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
-        if channel == self._state_channel and self._matcher is not None:
-            matched = self._matcher.match(data, position)
-            if len(matched):
-                self.parts.append(matched)
-                return position + len(matched) * RECORD.itemsize
-            self.parts.append(parse_row(data[start + MESSAGE_HEADER : end], self._parser))
-        elif self._channels.get(channel) == (EVENT_TOPIC, LOG_NAME):
-            message = Log.FromString(data[start + MESSAGE_HEADER : end])
-            if message.name == FLIGHT_EVENT_SOURCE:
-                return end
-            # Subtract integers first, because a float cannot represent ns since 1970 exactly.
-            time = (log_time - EPOCH_NS) / 1e9
-            self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))
-        return end
 
     def rows(self) -> StateRecords:
         """Return all state rows in the order of the file, (t,) of `RECORD`."""
@@ -334,7 +324,13 @@ def read_log(path: Path | str) -> FlightLog:
     if VERDICT_FILE in container.attachments:
         verdict = _parse_object(container.attachments[VERDICT_FILE]) or None
         verdict_fault = "" if verdict else f"{VERDICT_FILE} is not a JSON object"
-    reference, reference_fault = _read_reference(container.attachments)
+    reference: ReferenceFlights | None = None
+    reference_fault = ""
+    if REFERENCE_FILE in container.attachments:
+        try:
+            reference = parse_reference_flights(container.attachments[REFERENCE_FILE], REFERENCE_FILE)
+        except LogError as error:
+            reference_fault = str(error)
     loss = row_fault or container.problem
     is_recovered = not loss and RECOVERY_FILE in container.attachments
     loss = loss or result_fault or verdict_fault or reference_fault
@@ -407,16 +403,6 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
     if data.get("rows") != row_count:
         return end_reason, f"the log contains {row_count} of {data.get('rows')} rows"
     return end_reason, ""
-
-
-def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
-    """Return the results of reference flights or None, and the fault of their attachment or ""."""
-    if REFERENCE_FILE not in attachments:
-        return None, ""
-    try:
-        return parse_reference_flights(attachments[REFERENCE_FILE], REFERENCE_FILE), ""
-    except LogError as error:
-        return None, str(error)
 
 
 def _parse_object(data: bytes) -> dict[str, Any]:

@@ -17,10 +17,9 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, ValidationError, field_validator
 
-from flight.autopilots.autopilot import Autopilot, StoredAutopilot
+from flight.autopilots.autopilot import StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot, stored_name
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
@@ -42,7 +41,7 @@ from world.forecast.forecast import ForecastFacts
 from world.forecast.wind_field import MAX_FIELD_NUMBERS, WindField
 from world.frames import MAX_TERMS, PolyMap
 from world.raster import MAX_PIXELS
-from world.scenario import Scenario, scenario_from_spec
+from world.scenario import scenario_from_spec
 from world.scenario_file import JSON_OBJECT, first_fault
 from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
@@ -118,8 +117,13 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
     """Encode the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights in parts."""
     rows, cols = terrain.heights.shape
     parts = {}
+    compressor = zstandard.ZstdCompressor(level=3)
+    # Compress the heights without loss, with the encoding `_ENCODING`.
     for k, (first, last) in enumerate(_row_blocks(rows, cols)):
-        parts[heights_name(k)] = _pack_heights(terrain.heights[first:last])
+        bits = np.ascontiguousarray(terrain.heights[first:last], dtype="<f4").view("<u4")
+        bits = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), dtype="<u4"))
+        planes = np.ascontiguousarray(bits.reshape(-1, 1).view(np.uint8).T)
+        parts[heights_name(k)] = bytes(compressor.compress(planes.tobytes()))
     file = _TerrainFile(
         rows=rows,
         cols=cols,
@@ -158,11 +162,31 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
         raise LogError(message, file=source, field="parts", value=len(file.parts))
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
-        heights[first:last] = _unpack_heights(attachments[name], last - first, file.cols, f"{source}: {name}")
-    rows = _check_coefficients(file.map_to_pixel, source)
+        part_name = f"{source}: {name}"
+        rows = last - first
+        size = rows * file.cols * 4
+        try:
+            # The reader limits the size; decompress() would trust the size that the data declare.
+            reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(attachments[name])
+            raw = reader.read(size + 1)
+        except zstandard.ZstdError as error:
+            raise LogError(f"{part_name}: cannot be decompressed: {error}", file=part_name) from error
+        if len(raw) != size:
+            raise LogError(f"{part_name}: expected {rows} x {file.cols} heights: the size differs", file=part_name)
+        bits = np.ascontiguousarray(np.frombuffer(raw, np.uint8).reshape(4, -1).T).view("<u4").reshape(rows, file.cols)
+        heights[first:last] = np.cumsum(bits, axis=1, dtype=np.uint32).astype("<u4").view("<f4")
+    map_rows = file.map_to_pixel
+    terms = len(map_rows[0])
+    if len(map_rows) != 2 + 2 * terms or any(len(row) != terms for row in map_rows) or terms < 2:
+        shape_text = f"{len(map_rows)} rows of {terms}"
+        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", shape_text, "expected 2 + 2n rows of n")
+    half_widths = map_rows[1][:2]
+    if not (math.fabs(half_widths[0]) > 0.0 and math.fabs(half_widths[1]) > 0.0):
+        shown_value = f"half-widths {half_widths}"
+        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", half_widths, "not above 0", shown=shown_value)
     return Terrain(
         heights=heights,
-        to_pixel=PolyMap.from_rows(rows, file.map_residual_pixels),
+        to_pixel=PolyMap.from_rows(np.array(map_rows), file.map_residual_pixels),
         spacing=file.spacing_m,
         source=file.source,
         sha256=file.sha256,
@@ -175,40 +199,6 @@ def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
     """Divide the rows of the terrain among attachments; return (first row, row after the last) of each."""
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
-
-
-def _pack_heights(heights: NDArray[np.float32]) -> bytes:
-    """Compress heights without loss, with the encoding `_ENCODING`."""
-    bits = np.ascontiguousarray(heights, dtype="<f4").view("<u4")
-    bits = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), dtype="<u4"))
-    planes = np.ascontiguousarray(bits.reshape(-1, 1).view(np.uint8).T)
-    return bytes(zstandard.ZstdCompressor(level=3).compress(planes.tobytes()))
-
-
-def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any]:
-    """Decompress the result of `_pack_heights`; raise LogError for damaged data or another size."""
-    size = rows * cols * 4
-    try:
-        # The reader limits the size; decompress() would trust the size that the data declare.
-        raw = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data).read(size + 1)
-    except zstandard.ZstdError as error:
-        raise LogError(f"{name}: cannot be decompressed: {error}", file=name) from error
-    if len(raw) != size:
-        raise LogError(f"{name}: expected {rows} x {cols} heights: the size differs", file=name)
-    bits = np.ascontiguousarray(np.frombuffer(raw, np.uint8).reshape(4, -1).T).view("<u4").reshape(rows, cols)
-    return np.cumsum(bits, axis=1, dtype=np.uint32).astype("<u4").view("<f4")
-
-
-def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
-    """Return the coefficients of the map to pixels as an array; raise LogError for invalid ones."""
-    size = len(rows[0])
-    if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
-        shape_text = f"{len(rows)} rows of {size}"
-        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", shape_text, "expected 2 + 2n rows of n")
-    if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
-        shown_value = f"half-widths {rows[1][:2]}"
-        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", rows[1][:2], "not above 0", shown=shown_value)
-    return np.array(rows)
 
 
 # ----------------------------------------------------------------------
@@ -426,8 +416,35 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
             raise LogError(message, file=source, field=name)
     listed_attachments = {name: attachments[name] for name in file.sha256}
     terrain = unpack_terrain(listed_attachments, source) if TERRAIN_FILE in listed_attachments else None
-    scenario = _read_scenario(listed_attachments, source, terrain, file.external)
+    plan: Plan | None = None
+    plan_text = ""
+    _, spec = _read_json(listed_attachments, SCENARIO_FILE, source, terrain)
+    if PLAN_FILE in listed_attachments:
+        plan_text, _ = _read_json(listed_attachments, PLAN_FILE, source, terrain)
+    try:
+        scenario = scenario_from_spec(
+            spec, f"{source}: {SCENARIO_FILE}", ground=terrain, external=file.external, is_stored=True
+        )
+        if PLAN_FILE in listed_attachments:
+            plan = parse_plan(plan_text, f"{source}: {PLAN_FILE}", ground=terrain, is_stored=True)
+    except PlanflyError as error:
+        raise LogError.from_error(error) from error
+    is_in_forecast = None not in (scenario.spec.wind.forecast, scenario.spec.at)
+    wind = unpack_forecast(listed_attachments, source, scenario.wind, is_in_forecast=is_in_forecast)
+    scenario = replace(scenario, wind=wind)
     file_name = f"{source}: {SETUP_FILE}"
+    stored_autopilot = StoredAutopilot(
+        file.guidance,
+        None if file.parameters is None else read_parameters(file.parameters),
+        None if file.program is None else file.program.program(),
+        file.autopilot_version or "",
+    )
+    try:
+        autopilot = restore_autopilot(file.autopilot, stored_autopilot)
+    except ParameterError as error:
+        raise LogError(f"{file_name}: parameters.values: {error}", file=file_name, field="parameters.values") from error
+    except KeyError as error:
+        raise LogError.at(file_name, "autopilot", file.autopilot, "not an autopilot of this version") from error
     envelope = file.envelope.envelope(file_name)
     setup = FlightSetup(
         scenario=scenario,
@@ -437,30 +454,14 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         aircraft=file.aircraft,
         battery=file.battery_wh,
         seed=file.seed,
-        plan=_read_plan(listed_attachments, source, terrain) if PLAN_FILE in listed_attachments else None,
-        autopilot=_read_autopilot(file, file_name),
+        plan=plan,
+        autopilot=autopilot,
         nav=file.nav,
         guidance_hz=file.guidance_hz,
         fdm_hz=file.fdm_hz,
         imported_log=file.source,
     )
     return StoredSetup(setup, file.versions)
-
-
-def _read_autopilot(file: _SetupFile, file_name: str) -> Autopilot:
-    """Rebuild the autopilot from `setup.json`; raise LogError if its parameters or its name are invalid."""
-    stored_autopilot = StoredAutopilot(
-        file.guidance,
-        None if file.parameters is None else read_parameters(file.parameters),
-        None if file.program is None else file.program.program(),
-        file.autopilot_version or "",
-    )
-    try:
-        return restore_autopilot(file.autopilot, stored_autopilot)
-    except ParameterError as error:
-        raise LogError(f"{file_name}: parameters.values: {error}", file=file_name, field="parameters.values") from error
-    except KeyError as error:
-        raise LogError.at(file_name, "autopilot", file.autopilot, "not an autopilot of this version") from error
 
 
 def _json_bytes(data: Any) -> bytes:
@@ -479,51 +480,24 @@ def _finite_or_text(data: Any) -> Any:
     return data
 
 
-def _decode_text(attachments: dict[str, bytes], name: str, source: str) -> str:
-    """Return an attachment's text; raise LogError if it is missing or not UTF-8."""
-    try:
-        return attachments[name].decode()
-    except KeyError:
-        raise LogError(f"{source}: {name}: missing", file=source, field=name) from None
-    except UnicodeDecodeError as error:
-        message = f"{source}: {name}: not UTF-8 text (byte {error.start})"
-        raise LogError(message, file=source, field=name) from error
+def _read_json(attachments: dict[str, bytes], name: str, source: str, terrain: Terrain | None) -> tuple[str, Any]:
+    """Return the text and the value of the attachment of the scenario or the plan.
 
-
-def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
-    """Rebuild the scenario with the terrain from the log; raise LogError if it is invalid."""
-    file_name = f"{source}: {SCENARIO_FILE}"
+    Raises LogError if it is missing, not JSON, or needs terrain although the log has none.
+    """
+    file_name = f"{source}: {name}"
     try:
-        spec = json_value(_decode_text(attachments, SCENARIO_FILE, source))
-    except ValueError as error:
-        raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
-    _check_terrain_is_stored(spec, terrain, file_name)
-    try:
-        scenario = scenario_from_spec(spec, file_name, ground=terrain, external=external, is_stored=True)
-    except PlanflyError as error:
-        raise LogError.from_error(error) from error
-    is_in_forecast = None not in (scenario.spec.wind.forecast, scenario.spec.at)
-    return replace(scenario, wind=unpack_forecast(attachments, source, scenario.wind, is_in_forecast=is_in_forecast))
-
-
-def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
-    """Rebuild the plan with the terrain from the log; raise LogError if it is invalid."""
-    file_name = f"{source}: {PLAN_FILE}"
-    text = _decode_text(attachments, PLAN_FILE, source)
-    try:
+        text = attachments[name].decode()
         data = json_value(text)
+    except KeyError:
+        raise LogError(f"{file_name}: missing", file=source, field=name) from None
+    except UnicodeDecodeError as error:
+        raise LogError(f"{file_name}: not UTF-8 text (byte {error.start})", file=source, field=name) from error
     except ValueError as error:
         raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
-    _check_terrain_is_stored(data.get("scenario") if isinstance(data, dict) else None, terrain, file_name)
-    try:
-        return parse_plan(text, file_name, ground=terrain, is_stored=True)
-    except PlanflyError as error:
-        raise LogError.from_error(error) from error
-
-
-def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, file_name: str) -> None:
-    """Raise LogError if a log has no terrain, unless its scenario has terrain of the kind "none"."""
-    terrain_table = spec.get("terrain") if isinstance(spec, dict) else None
+    scenario_table = data.get("scenario") if name == PLAN_FILE and isinstance(data, dict) else data
+    terrain_table = scenario_table.get("terrain") if isinstance(scenario_table, dict) else None
     kind = terrain_table.get("kind") if isinstance(terrain_table, dict) else None
     if terrain is None and kind != "none":
         raise LogError.at(file_name, "terrain.kind", kind, f"the log contains no {TERRAIN_FILE}", shown=repr(kind))
+    return text, data

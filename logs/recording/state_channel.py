@@ -128,44 +128,47 @@ class StateField(NamedTuple):
         return values if self.component is None else values[:, self.component]
 
 
-def _make_fields() -> tuple[StateField, ...]:
-    """List the fields of the state message in order, without its first field `row`."""
-    fields = []
-    for source, names in COLUMN_NAMES.items():
-        kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
-        fields += [StateField(name, kind, source, None if len(names) == 1 else k) for k, name in enumerate(names)]
-    return tuple(fields)
-
-
-FIELDS = _make_fields()
+# The fields of the state message in order, without its first field `row`.
+FIELDS = tuple(
+    StateField(
+        name=name,
+        kind="<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4",
+        source=source,
+        component=None if len(names) == 1 else k,
+    )
+    for source, names in COLUMN_NAMES.items()
+    for k, name in enumerate(names)
+)
 _MESSAGE_FIELDS = [("row", "<u4"), *((field.name, field.kind) for field in FIELDS)]
 
-
-def _make_file_descriptor() -> descriptor_pb2.FileDescriptorProto:
-    """Make the protobuf description of the file that declares the state message."""
-    file = descriptor_pb2.FileDescriptorProto(name="planfly/State.proto", package="planfly", syntax="proto3")
-    message = file.message_type.add(name="State")
-    for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
-        message.field.add(name=name, number=number, type=_KINDS[kind][0], label=_TYPE.LABEL_OPTIONAL)
-    return file
-
-
-def _make_layout() -> tuple[np.dtype[np.void], dict[str, int]]:
-    """Return the structured type of a message, with a tag before each value, and the tags by name."""
-    parts: list[tuple[str, str]] = []
-    tags: dict[str, int] = {}
-    for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
-        tag = number << 3 | _KINDS[kind][1]
-        # From field 16 on, the tag is a varint of two bytes, low seven bits first.
-        tags[f"tag_{name}"] = tag if tag < 128 else (tag & 127 | 128) | (tag >> 7) << 8
-        parts += [(f"tag_{name}", "u1" if tag < 128 else "<u2"), (name, kind)]
-    return np.dtype(parts), tags
-
-
-STATE_FILE = _make_file_descriptor()
-_LAYOUT = _make_layout()
-STATE_BODY = _LAYOUT[0]
-_TAGS = _LAYOUT[1]
+# The protobuf description of the file that declares the state message.
+STATE_FILE = descriptor_pb2.FileDescriptorProto(
+    name="planfly/State.proto",
+    package="planfly",
+    syntax="proto3",
+    message_type=[
+        descriptor_pb2.DescriptorProto(
+            name="State",
+            field=[
+                _TYPE(name=name, number=number, type=_KINDS[kind][0], label=_TYPE.LABEL_OPTIONAL)
+                for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1)
+            ],
+        )
+    ],
+)
+# The tag before each value.  From field 16 on, the tag is a varint of two bytes, low seven bits first.
+_TAGS = {
+    f"tag_{name}": tag if tag < 128 else (tag & 127 | 128) | (tag >> 7) << 8
+    for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1)
+    for tag in (number << 3 | _KINDS[kind][1],)
+}
+STATE_BODY = np.dtype(
+    [
+        part
+        for (tag_name, tag), message_field in zip(_TAGS.items(), _MESSAGE_FIELDS, strict=True)
+        for part in ((tag_name, "u1" if tag < 256 else "<u2"), message_field)
+    ]
+)
 # One MCAP message record of this channel, including its header.
 RECORD = np.dtype(
     [
@@ -215,17 +218,11 @@ def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
-def _make_template() -> StateRecords:
-    """Make a message record of one state message with all tags and lengths set, and values of 0."""
-    row: StateRecords = np.zeros(1, dtype=RECORD)
-    row["opcode"] = MESSAGE_OPCODE
-    row["length"] = MESSAGE_HEADER + STATE_BODY.itemsize
-    for name, tag in _TAGS.items():
-        row["state"][name] = tag
-    return row
-
-
-_TEMPLATE = _make_template()
+# A message record of one state message with all tags and lengths set, and values of 0.
+_TEMPLATE: StateRecords = np.zeros(1, dtype=RECORD)
+_TEMPLATE["opcode"] = MESSAGE_OPCODE
+_TEMPLATE["length"] = MESSAGE_HEADER + STATE_BODY.itemsize
+_TEMPLATE["state"][list(_TAGS)] = tuple(_TAGS.values())
 
 
 def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> StateRecords:

@@ -9,7 +9,6 @@ import numpy as np
 from logs.verdict.findings import Finding
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, Layer, Panel, shorten
-from world.arrays import Floats
 
 # Margin of a panel above and below its values, as a fraction of their span.
 _MARGIN = 0.12
@@ -54,66 +53,48 @@ def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue
 def turn_chart(name: str, verdict: Verdict) -> Chart:
     """Chart turns, slopes, clearances, waypoints and corridor; each has a panel if the verdict judged it.
 
-    Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.
+    Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.  Limits far above all values
+    are not drawn; a note states the lowest of them.
 
     name: name of the scenario.
 
     >>> turn_chart("a plan", Verdict((), flyable=False, complete=False, lines=(), level="plan")).panels
     ()
     """
-    panels = tuple(
-        _make_rule_panel(rule, title, unit, place, values)
-        for rule, place, title, unit in PLACE_PANELS
-        if (values := list_place_values(verdict.findings, rule))
-    )
-    title = f"{shorten(name, 60)}: turn by turn, leg by leg"
-    return Chart(title, "", "", panels, shared=False, page_height=170, print_height=1.55, legend="below")
-
-
-def _make_rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
-    """Return the panel of a rule with planned and flown values, limits, and marked failures.
-
-    Limits far above all values are not drawn; a note states the lowest of them.
-
-    title, unit: title of the panel, and unit of the values.
-    place: title of the horizontal axis.
-    """
-    numbers = np.array([value.number for value in values], dtype=np.float64)
-    planned_values, flown_values, limit_values = (
-        np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")
-    )
-    failed = np.array([value.ok is False for value in values])
-    layers = [
-        Layer("bars", "planned", "planned", numbers, planned_values),
-        Layer("dashes", "limit", "limit", numbers, limit_values),
-        Layer("dots", "flown", "flown", numbers, flown_values),
-    ]
-    if failed.any():
-        marked_values = np.where(np.isfinite(flown_values), flown_values, planned_values)
-        layers.append(Layer("rings", "fails", "fail", numbers[failed], marked_values[failed], quiet=True))
-    known_values = np.concatenate([[0.0], planned_values, flown_values])
-    known_values = known_values[np.isfinite(known_values)]
-    limits = limit_values[np.isfinite(limit_values)]
-    shown_limits = limits[_find_visible_limits(limits, rule, float(np.abs(known_values).max()))]
-    min_value = float(min([*known_values, *shown_limits]))
-    max_value = float(max([*known_values, *shown_limits]))
-    margin = _MARGIN * ((max_value - min_value) or 1.0)
-    note = ""
-    if len(shown_limits) < len(limits):
-        hidden_limits = limits[~_find_visible_limits(limits, rule, float(np.abs(known_values).max()))]
-        note = (
-            f"{'other ' if shown_limits.size else ''}limits from {hidden_limits.min():.0f}"
-            f"{unit if unit == '°' else ' ' + unit}"
+    panels = []
+    for rule, place, panel_title, unit in PLACE_PANELS:
+        values = list_place_values(verdict.findings, rule)
+        if not values:
+            continue
+        numbers = np.array([value.number for value in values], dtype=np.float64)
+        planned_values, flown_values, limit_values = (
+            np.array([getattr(value, field) for value in values]) for field in ("planned", "flown", "limit")
         )
-    bottom = min_value - margin if failed.any() or min_value < 0.0 else 0.0
-    return Panel(title, unit, tuple(layers), span=(bottom, max_value + margin), along=place, note=note)
-
-
-def _find_visible_limits(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return a mask (n,), True for limits to show.
-
-    A limit of a turn or corridor far above the largest value `max_value` is hidden, because it would flatten the
-    values.
-    """
-    max_limit = _MAX_LIMIT_RATIO * max(max_value, 1e-9) if rule in ("turn", "corridor") else math.inf
-    return np.asarray(limits <= max_limit, dtype=np.bool_)
+        failed = np.array([value.ok is False for value in values])
+        layers = [
+            Layer("bars", "planned", "planned", numbers, planned_values),
+            Layer("dashes", "limit", "limit", numbers, limit_values),
+            Layer("dots", "flown", "flown", numbers, flown_values),
+        ]
+        if failed.any():
+            marked_values = np.where(np.isfinite(flown_values), flown_values, planned_values)
+            layers.append(Layer("rings", "fails", "fail", numbers[failed], marked_values[failed], quiet=True))
+        known_values = np.concatenate([[0.0], planned_values, flown_values])
+        known_values = known_values[np.isfinite(known_values)]
+        limits = limit_values[np.isfinite(limit_values)]
+        # A limit of a turn or corridor far above the largest value is hidden, because it would flatten the values.
+        max_known = max(float(np.abs(known_values).max()), 1e-9)
+        max_limit = _MAX_LIMIT_RATIO * max_known if rule in ("turn", "corridor") else math.inf
+        shown_limits, hidden_limits = limits[limits <= max_limit], limits[limits > max_limit]
+        min_value = float(min([*known_values, *shown_limits]))
+        max_value = float(max([*known_values, *shown_limits]))
+        margin = _MARGIN * ((max_value - min_value) or 1.0)
+        note = ""
+        if hidden_limits.size:
+            unit_text = unit if unit == "°" else f" {unit}"
+            note = f"{'other ' if shown_limits.size else ''}limits from {hidden_limits.min():.0f}{unit_text}"
+        bottom = min_value - margin if failed.any() or min_value < 0.0 else 0.0
+        span = (bottom, max_value + margin)
+        panels.append(Panel(panel_title, unit, tuple(layers), span=span, along=place, note=note))
+    title = f"{shorten(name, 60)}: turn by turn, leg by leg"
+    return Chart(title, "", "", tuple(panels), shared=False, page_height=170, print_height=1.55, legend="below")

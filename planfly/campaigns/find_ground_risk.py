@@ -10,7 +10,7 @@ path: the largest width that is needed anywhere.
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -140,7 +140,12 @@ def fly_for_excursions(
     times, positions, velocities = _sampled_flight(flown_mission.track)
     paths = _return_paths(setup, flown_mission.track, interval, glide=glide)
     uav = varied.uav.aircraft
-    sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
+    # Positions of flight and returns, and ground velocities, (n, 3) each; a return is sampled at every
+    # `_RETURN_SAMPLE_ROWS`-th position, one each second, and at its last one.
+    sampled = [(positions, velocities)]
+    for return_path in paths.returns:
+        rows = np.union1d(np.arange(0, len(return_path), _RETURN_SAMPLE_ROWS), [len(return_path) - 1])
+        sampled.append((return_path[rows], np.gradient(return_path, axis=0)[rows]))
     half_span = 0.5 * uav.wing_span
     lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
     turns = turn_areas(times, positions, paths.times, paths.turns, interval)
@@ -153,7 +158,17 @@ def fly_for_excursions(
         """Return the wind at places, m, (n, 3), at half the flight's duration, m/s, (n, 2)."""
         return setup.scenario.wind_velocities(places, np.full(len(places), half_time))
 
-    falls = _fall_areas(sampled, uav, find_wind, terrain)
+    # Areas in which the aircraft can fall from each path: unions of hulls, each of which contains a piece of the path
+    # and the impact points of falls from that piece.
+    all_positions, all_velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
+    impacts = [
+        impact_points(all_positions, all_velocities, drag, find_wind, terrain) for drag in (0.0, plate_drag(uav))
+    ]
+    points = np.stack([all_positions[:, :2], *impacts], axis=1)
+    falls = []
+    for path_points in np.split(points, np.cumsum([len(places) for places, _ in sampled])[:-1]):
+        corners = np.concatenate([path_points[:-1], path_points[1:]], axis=1)
+        falls.append(shapely.union_all(shapely.convex_hull(shapely.multipoints(shapely.points(corners)))))
     glides = shapely.buffer([shapely.LineString(glide_path[:, :2]) for glide_path in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
@@ -183,17 +198,6 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
     is_kept[-1] = True
     sampled_rows = rows[is_kept]
     return track.time[sampled_rows], track.position[sampled_rows], track.velocity[sampled_rows].astype(np.float64)
-
-
-def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
-    """Return sampled positions of a return, m, and ground velocities, m/s, (n, 3) each.
-
-    Samples are every `_RETURN_SAMPLE_ROWS`-th position and the last position.
-
-    path: positions of the return, one each second, m, (t, 3).
-    """
-    rows = np.union1d(np.arange(0, len(path), _RETURN_SAMPLE_ROWS), [len(path) - 1])
-    return path[rows], np.gradient(path, axis=0)[rows]
 
 
 class _ReturnPaths(NamedTuple):
@@ -294,27 +298,6 @@ def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
     lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
     rings = [np.concatenate([line, next_line[::-1]]) for line, next_line in itertools.pairwise(lines)]
     return [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
-
-
-def _fall_areas(
-    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, find_wind: Callable[[Floats], Floats], terrain: Terrain
-) -> list[BaseGeometry]:
-    """Return for each path the area in which an aircraft can fall from it.
-
-    The area is the union of hulls; each contains a piece of the path and the impact points of falls from that piece.
-    sampled: positions, m, and ground velocities, m/s, of each path, (n, 3) each.
-    find_wind: see `impact_points`.
-    """
-    positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
-    impacts = [impact_points(positions, velocities, drag, find_wind, terrain) for drag in (0.0, plate_drag(aircraft))]
-    points = np.stack([positions[:, :2], *impacts], axis=1)
-    ends = np.cumsum([len(path_positions) for path_positions, _ in sampled])[:-1]
-    areas = []
-    for path_points in np.split(points, ends):
-        corners = np.concatenate([path_points[:-1], path_points[1:]], axis=1)
-        hulls = shapely.convex_hull(shapely.multipoints(shapely.points(corners)))
-        areas.append(shapely.union_all(hulls))
-    return areas
 
 
 def _largest_height(positions: Floats, terrain: Terrain) -> float:

@@ -117,7 +117,24 @@ def ensure_altitude_margin(plan: Plan, uav: Uav, search: Search | None = None) -
         other_plan = _search_other_plan(plan, uav, search, shortfalls)
         if other_plan is not None:
             return other_plan
-    return _with_problems(plan, [_shortfall_text(shortfall, plan, uav) for shortfall in shortfalls])
+    # One line for each shortfall, with its remedies: less turbulence, a better aircraft, and a change of the height
+    # that limits the path, if there is one.
+    problems = []
+    for shortfall in shortfalls:
+        is_downdraft, change = shortfall.gust == "downdrafts", ""
+        is_below_height_limit = not is_downdraft and not shortfall.is_threat
+        if shortfall.end_name:
+            direction = "higher" if is_downdraft else "lower"
+            change = f" or a {shortfall.end_name} that is {math.ceil(shortfall.depth)} m {direction}"
+        elif is_below_height_limit or _exceeds_height_limit(plan, limits_in_gusts(plan, uav).reserve_height):
+            change = " or a higher limit on the height"
+        ability_text = "climbs better" if is_downdraft else "sinks faster"
+        problems.append(
+            f"in {turbulence} turbulence, {shortfall.gust} may move the aircraft {shortfall.depth:.0f} m"
+            f" {shortfall.hazard} {shortfall.place}. Less turbulence{',' if change else ' or'} an aircraft that"
+            f" {ability_text}{change} would help"
+        )
+    return _with_problems(plan, problems)
 
 
 def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
@@ -444,23 +461,3 @@ def _gust_paths(parts: _Parts) -> list[Floats]:
     step_count = max(1, math.ceil(float(margins.max()) / _HEIGHT_STEP_M))
     displacement = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * margins[:, None]
     return [np.ascontiguousarray(parts.points + displacement * step / step_count) for step in range(1, step_count + 1)]
-
-
-def _shortfall_text(shortfall: Shortfall, plan: Plan, uav: Uav) -> str:
-    """Describe a shortfall and its remedies in one line.
-
-    The remedies are less turbulence, a better aircraft, and a change of the height that limits the path, if there is
-    one.
-    """
-    ability_text = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
-    remedies = f"Less turbulence, an aircraft that {ability_text}"
-    is_below_height_limit = shortfall.gust == "updrafts" and not shortfall.is_threat
-    if shortfall.end_name:
-        direction = "higher" if shortfall.gust == "downdrafts" else "lower"
-        remedies += f" or a {shortfall.end_name} that is {math.ceil(shortfall.depth)} m {direction}"
-    elif is_below_height_limit or _exceeds_height_limit(plan, limits_in_gusts(plan, uav).reserve_height):
-        remedies += " or a higher limit on the height"
-    else:
-        remedies = f"Less turbulence or an aircraft that {ability_text}"
-    effect_text = f"in {plan.scenario.wind.turbulence} turbulence, {shortfall.gust} may move the aircraft"
-    return f"{effect_text} {shortfall.depth:.0f} m {shortfall.hazard} {shortfall.place}. {remedies} would help"

@@ -58,9 +58,34 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
         ]
     )
     available_length = _leg_length_margin(data, waypoints, problems)
-    slope = min(_arc_slope_margin(data, waypoints, problems), _leg_slope_margin(data, waypoints, problems))
+    slope = _arc_slope_margin(data, waypoints, problems)
+    faults: list[_Fault] = []
+    limits = leg_slope_limits(data, waypoints)
+    for i, (leg_slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
+        margin = min(climb - leg_slope, dive + leg_slope)
+        slope = min(slope, margin)
+        if margin < -_EPSILON:
+            faults.append((margin, f"leg {i}", _slope_fault_text(data, leg_slope, climb, dive)))
+    problems += _summarise_faults(faults)
     clearance = _clearance_margin(data, waypoints, problems)
-    bounds = _bounds_margin(data, waypoints, problems)
+    # Distances of the waypoints from the edges of the map, the floor and the ceiling. The distance from an edge of the
+    # map is reduced by the autopilot's excursion at the corner.
+    min_corner = np.array([data.west, data.south, data.floor])
+    max_corner = np.array([data.east, data.north, data.ceiling])
+    distances = np.minimum(waypoints - min_corner, max_corner - waypoints)
+    if data.tracking.has_error:
+        distances[:, :2] -= corner_excursions(data, waypoints)[:, None]
+    bounds = distances.min(axis=1)
+    problems += _summarise_faults(
+        [
+            (
+                float(bounds[i]),
+                f"waypoint {i}",
+                f"{-bounds[i]:.1f} m beyond the edge of the area, the floor or the ceiling",
+            )
+            for i in np.nonzero(bounds < -_EPSILON)[0]
+        ]
+    )
     distance = kill_distance(data, waypoints)
     zones, headroom = _airspace_margins(problem, waypoints, problems)
     return Certificate(
@@ -68,7 +93,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
         available_length,
         _without_rounding(float(slope)),
         clearance,
-        bounds,
+        _without_rounding(float(bounds.min())),
         distance,
         tuple(problems),
         zones,
@@ -208,20 +233,6 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     return min_margin
 
 
-def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin of the legs, rad; append legs that are too steep to `problems`."""
-    min_margin = math.inf
-    limits = leg_slope_limits(data, waypoints)
-    faults: list[_Fault] = []
-    for i, (slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
-        margin = min(climb - slope, dive + slope)
-        min_margin = min(min_margin, margin)
-        if margin < -_EPSILON:
-            faults.append((margin, f"leg {i}", _slope_fault_text(data, slope, climb, dive)))
-    problems += _summarise_faults(faults)
-    return min_margin
-
-
 def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: float, place_text: str = "") -> str:
     """Describe a slope that exceeds the climb limit or the dive limit (rad, positive up).
 
@@ -275,31 +286,6 @@ class _LowPlace(NamedTuple):
 
     margin: float
     height: float
-
-
-def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest distance of a waypoint from the limits of the area, m.
-
-    The limits are the edges of the map, the floor and the ceiling. The distance from an edge of the map is reduced by
-    the autopilot's excursion at the corner. Violations are appended to `problems`.
-    """
-    min_corner = np.array([data.west, data.south, data.floor])
-    max_corner = np.array([data.east, data.north, data.ceiling])
-    distances = np.minimum(waypoints - min_corner, max_corner - waypoints)
-    if data.tracking.has_error:
-        distances[:, :2] -= corner_excursions(data, waypoints)[:, None]
-    margins = distances.min(axis=1)
-    problems += _summarise_faults(
-        [
-            (
-                float(margins[i]),
-                f"waypoint {i}",
-                f"{-margins[i]:.1f} m beyond the edge of the area, the floor or the ceiling",
-            )
-            for i in np.nonzero(margins < -_EPSILON)[0]
-        ]
-    )
-    return _without_rounding(float(margins.min()))
 
 
 def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:

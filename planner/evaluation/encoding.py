@@ -240,7 +240,23 @@ def rotated_encoding(space: Space, waypoints: int) -> Encoding:
     """
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
-    min_across, max_across = _across_limits(frame, space, edges)
+    if space.across is not None:
+        min_across, max_across = np.full(waypoints - 2, -space.across), np.full(waypoints - 2, space.across)
+    else:
+        # The limits across are the edges of the map; in an interval that is almost off the map they are -1 and 1.
+        c, s = frame.cosine, frame.sine
+        along = np.linspace(edges[:-1], edges[1:], 9, axis=1)
+        nearest, furthest = np.full(along.shape, -math.inf), np.full(along.shape, math.inf)
+        for (west, east), origin, along_factor, across_factor in zip(
+            space.bounds, frame[:2], (c, s), (-s, c), strict=True
+        ):
+            west_end, east_end = west - origin - along_factor * along, east - origin - along_factor * along
+            if abs(across_factor) > 1e-12:
+                nearest = np.maximum(nearest, np.minimum(west_end / across_factor, east_end / across_factor))
+                furthest = np.minimum(furthest, np.maximum(west_end / across_factor, east_end / across_factor))
+        min_across, max_across = nearest.min(axis=1), furthest.max(axis=1)
+        is_narrow = ~(max_across - min_across >= 1.0)
+        min_across, max_across = np.where(is_narrow, -1.0, min_across), np.where(is_narrow, 1.0, max_across)
     lower = np.column_stack([edges[:-1], min_across, np.full(waypoints - 2, space.up[0])])
     upper = np.column_stack([edges[1:], max_across, np.full(waypoints - 2, space.up[1])])
 
@@ -284,29 +300,6 @@ def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
     """Return the vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to the encoding's box."""
     inner_points = rotated_frame(space.start, space.destination).to_frame(paths[:, 1:-1])
     return np.clip(inner_points.reshape(len(paths), -1), encoding.lower, encoding.upper)
-
-
-def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Return the lower and upper limits of `across` in each of k intervals of the axis, m, (k,) each.
-
-    edges: (k + 1,) limits of the intervals along the axis, m.
-
-    The limits are those of `space.across`, or else the edges of the map. In an interval that is almost off the map they
-    are -1 and 1.
-    """
-    if space.across is not None:
-        return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
-    c, s = frame.cosine, frame.sine
-    along = np.linspace(edges[:-1], edges[1:], 9, axis=1)
-    lower, upper = np.full(along.shape, -math.inf), np.full(along.shape, math.inf)
-    for (west, east), origin, along_factor, across_factor in zip(space.bounds, frame[:2], (c, s), (-s, c), strict=True):
-        lower_end, upper_end = west - origin - along_factor * along, east - origin - along_factor * along
-        if abs(across_factor) > 1e-12:
-            lower = np.maximum(lower, np.minimum(lower_end / across_factor, upper_end / across_factor))
-            upper = np.minimum(upper, np.maximum(lower_end / across_factor, upper_end / across_factor))
-    min_across, max_across = lower.min(axis=1), upper.max(axis=1)
-    is_narrow = ~(max_across - min_across >= 1.0)
-    return np.where(is_narrow, -1.0, min_across), np.where(is_narrow, 1.0, max_across)
 
 
 def cartesian_encoding(space: Space, waypoints: int) -> Encoding:

@@ -346,8 +346,21 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     )
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified, certified.buffer))
+    # A search avoids unknown ground, because it has the height of the ceiling there. The certificate uses the original
+    # terrain.
+    heights, slope_bounds = terrain.heights, certified.slope_bounds
+    is_unknown = np.isnan(heights)
+    if is_unknown.any():
+        # A height depends on the four pixels around it, so a pixel next to an unknown one is filled too.
+        padded, (rows, cols) = np.pad(is_unknown, 1), is_unknown.shape
+        is_filled = np.any([padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)], axis=0)
+        filled = replace(terrain, heights=np.where(is_filled, np.float32(certified.ceiling), heights))
+        heights = filled.heights
+        slope_bounds = _make_slope_bounds(filled)._replace(steepest=slope_bounds.steepest)
     search = _shrink_area(
-        _fill_unknown_ground(certified, terrain)._replace(
+        certified._replace(
+            heights=heights,
+            slope_bounds=slope_bounds,
             buffer=buffer,
             airspace=airspace,
             kill_margin=SEARCH_KILL_MARGIN_M + limits.reserve_threats + across,
@@ -376,7 +389,24 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     tracking = zero_tracking_error() if limits.tracking is None else limits.tracking.record
     vertical, end_fraction = CERTIFIED_BUFFER_M + float(tracking.up), CERTIFIED_END_FRACTION
     buffer, vertical_zone_margin = vertical + limits.reserve_height, vertical + limits.reserve_threats
-    aircraft = _reduced_performance(scenario, limits)
+    # The aircraft's performance, reduced for turbulence and by the autopilot's vertical rates.
+    climb_fraction = sink_fraction = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence]
+    if limits.tracking is not None:
+        climb_fraction = min(climb_fraction, limits.tracking.own_climb_share)
+        sink_fraction = min(sink_fraction, limits.tracking.own_sink_share)
+    aircraft = derate(limits.performance(), climb_fraction, sink_fraction, limits.reserve_climb, limits.reserve_sink)
+    if limits.tracking is not None:
+        aircraft = limit_rates(aircraft, limits.tracking.climb_rate, limits.tracking.sink_rate)
+    # With a reserve above or below the path, the growth of the buffer is also limited by the slopes that the aircraft
+    # has left at both ends, so that it can follow the growth.
+    buffer_growth = BUFFER_GROWTH_RATIO
+    if limits.reserve_height or limits.reserve_above:
+        slopes = [
+            float(np.interp(point[2], aircraft.amsl, angles))
+            for point in (scenario.start, scenario.destination)
+            for angles in (aircraft.climb, aircraft.descent)
+        ]
+        buffer_growth = min(BUFFER_GROWTH_RATIO, MAX_GROWTH_FRACTION * max(0.0, math.tan(min(slopes))))
     (west, east), (south, north) = scenario.bounds.tolist()
     arrays = ProblemArrays(
         heights=terrain.heights,
@@ -408,7 +438,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         destination_course=_none_to_nan(scenario.destination_course),
         start_buffer=_end_buffer(terrain, limits, scenario.start, buffer, end_fraction),
         destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer, end_fraction),
-        buffer_growth=_buffer_growth(scenario, limits, aircraft),
+        buffer_growth=buffer_growth,
         threat_cells=make_threat_cells(scenario.threats.position, radius, scenario.bounds),
         missiles=make_missile_index(threats),
         slope_bounds=_make_slope_bounds(terrain),
@@ -450,35 +480,6 @@ def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
     return certified_margin + BAND_FRACTION * max(0.0, band_height)
 
 
-def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Return the aircraft's performance, reduced for turbulence and by the autopilot's vertical rates."""
-    slope_fraction, tracking = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence], limits.tracking
-    if tracking is None:
-        return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
-    climb_fraction, sink_fraction = (
-        min(slope_fraction, autopilot_fraction)
-        for autopilot_fraction in (tracking.own_climb_share, tracking.own_sink_share)
-    )
-    table = derate(limits.performance(), climb_fraction, sink_fraction, limits.reserve_climb, limits.reserve_sink)
-    return limit_rates(table, tracking.climb_rate, tracking.sink_rate)
-
-
-def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return the growth of the buffer (height above the clearance) with the distance from an end, m per m.
-
-    The growth is at most `BUFFER_GROWTH_RATIO`. With a reserve above or below the path it is also limited by the slopes
-    that the aircraft has left at both ends, so that it can follow the growth.
-    """
-    if not (limits.reserve_height or limits.reserve_above):
-        return BUFFER_GROWTH_RATIO
-    slopes = [
-        float(np.interp(point[2], aircraft.amsl, angles))
-        for point in (scenario.start, scenario.destination)
-        for angles in (aircraft.climb, aircraft.descent)
-    ]
-    return min(BUFFER_GROWTH_RATIO, MAX_GROWTH_FRACTION * max(0.0, math.tan(min(slopes))))
-
-
 def _none_to_nan(value: float | None) -> float:
     """Return a number, or NaN for None."""
     return math.nan if value is None else float(value)
@@ -509,22 +510,6 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
     neighbourhood_max = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
     neighbourhood_max.setflags(write=False)
     return SlopeBounds(max_slope, neighbourhood_max, TILE_PIXELS * terrain.spacing)
-
-
-def _fill_unknown_ground(data: ProblemArrays, terrain: Terrain) -> ProblemArrays:
-    """Return the arrays with unknown ground replaced by ground up to the ceiling, which a search avoids.
-
-    The certificate uses the original terrain, with its unknown ground.
-    """
-    is_unknown = np.isnan(terrain.heights)
-    if not is_unknown.any():
-        return data
-    # A height depends on the four pixels around it, so a pixel next to an unknown one is filled too.
-    padded, (rows, cols) = np.pad(is_unknown, 1), is_unknown.shape
-    is_filled = np.any([padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)], axis=0)
-    filled = replace(terrain, heights=np.where(is_filled, np.float32(data.ceiling), terrain.heights))
-    slope_bounds = _make_slope_bounds(filled)._replace(steepest=data.slope_bounds.steepest)
-    return data._replace(heights=filled.heights, slope_bounds=slope_bounds)
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:

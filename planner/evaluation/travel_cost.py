@@ -158,37 +158,29 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
     table: performance of the aircraft at the airspeed of the path.
     winds: wind of a forecast; without it, only the mean wind is used.
     """
-    rows = np.array([_power_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
+    # Level, linear, square, min_sine and max_sine at each altitude, as in `TravelCost`; NaN if the power is unknown or
+    # level flight is impossible.
+    rows = np.full((len(table.amsl), 5), math.nan)
+    for row, amsl in zip(rows, map(float, table.amsl), strict=True):
+        airspeed = true_airspeed(table, amsl)
+        climb, descent = envelope.air_angles(airspeed, amsl)
+        min_sine, max_sine = -math.sin(descent), math.sin(climb)
+        level = envelope.power(airspeed, amsl, 0.0)
+        if min_sine < 0.0 < max_sine and math.isfinite(level):
+            idle, full_throttle = (envelope.power(airspeed, amsl, angle) for angle in (-0.5 * math.pi, 0.5 * math.pi))
+            idle_slope, full_throttle_slope = (idle - level) / min_sine, (full_throttle - level) / max_sine
+            square = (full_throttle_slope - idle_slope) / (max_sine - min_sine)
+            row[:] = level, full_throttle_slope - square * max_sine, square, min_sine, max_sine
     is_known = np.isfinite(rows).all(axis=1)
     if not is_known.any():
         return None
     columns = [np.interp(table.amsl, table.amsl[is_known], rows[is_known, k]) for k in range(5)]
     for column in columns:
         column.setflags(write=False)
-    level, linear, square, min_sine, max_sine = columns
-    return TravelCost(0.0, 0.0, float(table.airspeed / level[0]), level, linear, square, min_sine, max_sine, winds)
-
-
-def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Fit a parabola to the power as a function of the sine of the climb angle.
-
-    It passes through idle in the steepest descent, level flight, and full throttle in the steepest climb.
-
-    Returns level, linear, square, min_sine and max_sine, as in `TravelCost`. All are NaN if the power is unknown or
-    level flight is impossible.
-
-    airspeed: m/s.
-    amsl: altitude, m.
-    """
-    climb, descent = envelope.air_angles(airspeed, amsl)
-    min_sine, max_sine = -math.sin(descent), math.sin(climb)
-    level = envelope.power(airspeed, amsl, 0.0)
-    if not (min_sine < 0.0 < max_sine and math.isfinite(level)):
-        return (math.nan,) * 5
-    idle, full_throttle = envelope.power(airspeed, amsl, -0.5 * math.pi), envelope.power(airspeed, amsl, 0.5 * math.pi)
-    idle_slope, full_throttle_slope = (idle - level) / min_sine, (full_throttle - level) / max_sine
-    square = (full_throttle_slope - idle_slope) / (max_sine - min_sine)
-    return level, full_throttle_slope - square * max_sine, square, min_sine, max_sine
+    levels, linears, squares, min_sines, max_sines = columns
+    return TravelCost(
+        0.0, 0.0, float(table.airspeed / levels[0]), levels, linears, squares, min_sines, max_sines, winds
+    )
 
 
 class LegTime(NamedTuple):

@@ -128,8 +128,32 @@ class FrontSampling:
         samples = self.vectors[mean_rows]
         is_near, is_in_block, is_noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
         samples[is_near] += self._draw_near_displacements(mean_rows[is_near])
-        samples[is_in_block] += self._draw_block_displacements(mean_rows[is_in_block])
-        samples[is_noisy] += self._draw_noise(self._scales[kinds[is_noisy], None])
+        rng = self._rng
+        # Each block of neighbouring points moves towards another solution. Blocks may begin before the first point and
+        # end after the last, so that each point is equally often in one.
+        rows, point_count = mean_rows[is_in_block], self._lower.size // self._axes
+        count, point_indices = len(rows), np.arange(point_count)
+        other_rows = rng.integers(len(self.vectors), size=count)
+        block_lengths = rng.integers(1, point_count + 1, size=count)
+        block_starts = rng.integers(1 - block_lengths, point_count)[:, None]
+        is_moving_point = (point_indices >= block_starts) & (point_indices < block_starts + block_lengths[:, None])
+        is_moving_coordinate = rng.random((count, 1, self._axes)) < EVEN_CHANCE
+        is_moving_coordinate |= ~is_moving_coordinate.any(axis=2, keepdims=True)
+        fractions = np.where(rng.random((count, 1)) < EVEN_CHANCE, 1.0, rng.uniform(0.0, MAX_BLOCK_STEP, (count, 1)))
+        is_moving_variable = (is_moving_point[:, :, None] & is_moving_coordinate).reshape(count, -1)
+        samples[is_in_block] += fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[rows])
+        # Noise along a few of the given directions for each sample, with the scale of its kind times a random factor.
+        count, direction_count = int(np.count_nonzero(is_noisy)), len(self._directions)
+        directions_per_sample = min(MAX_DIRECTIONS, direction_count)
+        picked_directions = rng.integers(direction_count, size=(count, directions_per_sample))
+        factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(MIN_EXPONENT, MAX_EXPONENT, (count, 1)))
+        scales = self._scales[kinds[is_noisy], None]
+        step_lengths = scales * factors * rng.standard_normal((count, directions_per_sample))
+        step_lengths[:, 1:] *= rng.random((count, directions_per_sample - 1)) < EVEN_CHANCE
+        noise = np.zeros((count, self._lower.size))
+        for k in range(directions_per_sample):
+            noise += step_lengths[:, k, None] * self._directions[picked_directions[:, k]]
+        samples[is_noisy] += noise
         return np.clip(samples, self._lower, self._upper)
 
     def _draw_near_displacements(self, mean_rows: Ints) -> Floats:
@@ -153,41 +177,6 @@ class FrontSampling:
         for k in range(neighbour_count):
             displacements += weights[:, k, None] * (self.vectors[nearest_rows[:, k]] - self.vectors[mean_rows])
         return displacements
-
-    def _draw_block_displacements(self, mean_rows: Ints) -> Floats:
-        """Draw displacements (n, d), each of which moves a block of neighbouring points towards another solution.
-
-        mean_rows: (n,) rows of the means in the archive.
-        """
-        rng, count, point_count = self._rng, len(mean_rows), self._lower.size // self._axes
-        other_rows = rng.integers(len(self.vectors), size=count)
-        block_lengths = rng.integers(1, point_count + 1, size=count)
-        # Blocks may begin before the first point and end after the last, so that each point is equally often in one.
-        block_starts, point_indices = rng.integers(1 - block_lengths, point_count), np.arange(point_count)
-        is_in_block = (point_indices >= block_starts[:, None]) & (
-            point_indices < (block_starts + block_lengths)[:, None]
-        )
-        is_moving_coordinate = rng.random((count, 1, self._axes)) < EVEN_CHANCE
-        is_moving_coordinate |= ~is_moving_coordinate.any(axis=2, keepdims=True)
-        fractions = np.where(rng.random((count, 1)) < EVEN_CHANCE, 1.0, rng.uniform(0.0, MAX_BLOCK_STEP, (count, 1)))
-        is_moving_variable = (is_in_block[:, :, None] & is_moving_coordinate).reshape(count, -1)
-        return np.asarray(fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[mean_rows]))
-
-    def _draw_noise(self, scales: Floats) -> Floats:
-        """Draw random displacements (n, d) along a few of the given directions for each sample.
-
-        scales: (n, 1) scale of each sample; a random factor multiplies it.
-        """
-        rng, count, direction_count = self._rng, len(scales), len(self._directions)
-        directions_per_sample = min(MAX_DIRECTIONS, direction_count)
-        picked_directions = rng.integers(direction_count, size=(count, directions_per_sample))
-        factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(MIN_EXPONENT, MAX_EXPONENT, (count, 1)))
-        step_lengths = scales * factors * rng.standard_normal((count, directions_per_sample))
-        step_lengths[:, 1:] *= rng.random((count, directions_per_sample - 1)) < EVEN_CHANCE
-        noise = np.zeros((count, self._lower.size))
-        for k in range(directions_per_sample):
-            noise += step_lengths[:, k, None] * self._directions[picked_directions[:, k]]
-        return noise
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
         """Insert the best samples into the archive, and adapt the scale of the noise of each kind.

@@ -608,9 +608,16 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
     )
     finals, reasons = [], []
     for course in courses:
-        strip_fault = _describe_strip_fault(site.terrain, strip, course)
-        if strip_fault:
-            reasons.append(strip_fault)
+        strip_faults = [
+            "the terrain at the ends of the strip is unknown"
+            if math.isnan(slope)
+            else f"the strip slopes by {abs(slope):.0%} {direction} its course of {round(math.degrees(course)) % 360}°;"
+            f" landings are planned on slopes of at most {STEEPEST_STRIP_SLOPE:.0%}"
+            for direction, slope in zip(("along", "across"), strip_slopes(site.terrain, strip, course), strict=True)
+            if not abs(slope) <= STEEPEST_STRIP_SLOPE
+        ]
+        if strip_faults:
+            reasons.append(strip_faults[0])
             continue
         course_finals, reason = _find_finals(site, strip, course, point, final_model)
         finals += course_finals
@@ -631,19 +638,6 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
             continue
         return Descent(corners, final.final_waypoints, point, final.course, final.height / final.length, go_around), ""
     return None, reason
-
-
-def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
-    """Describe why a strip's ground is unsuitable for landing on a course (rad); "" if it is suitable."""
-    for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
-        if math.isnan(slope):
-            return "the terrain at the ends of the strip is unknown"
-        if abs(slope) > STEEPEST_STRIP_SLOPE:
-            return (
-                f"the strip slopes by {abs(slope):.0%} {direction} its course of {round(math.degrees(course)) % 360}°;"
-                f" landings are planned on slopes of at most {STEEPEST_STRIP_SLOPE:.0%}"
-            )
-    return ""
 
 
 def _find_finals(

@@ -345,6 +345,8 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
     """
     yield default
     count, all_threats = len(default), task.problem.scenario.threats
+    bound = MAX_LENGTH_RATIO * float(path_length(default))
+    span = (-0.5 * bound, 0.5 * bound)
     has_radar = (all_threats.detection_radius > 0.0).any()
     for radar_fraction in RADAR_FRACTIONS if has_radar else RADAR_FRACTIONS[:1]:
         threats = threat_records(all_threats).copy()
@@ -352,9 +354,23 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
         # Read-only like a scenario's threats: for a writable array the kernels would be compiled again.
         threats.setflags(write=False)
         data = task.problem.search._replace(threats=threats, missiles=make_missile_index(threats))
-        routes = _list_routes(data, task.frame, default)
+        # Routes that pass the missile spheres and zones on different sides.
         if is_limited(data.airspace):
+            zone_routes = airspace_routes(data, task.frame, span, ZONE_GRIDS)
+            routes = [fit_waypoints(data, task.frame, route.points, count, QUICK_FIT) for route in zone_routes]
             yield from routes
+        else:
+            grid = optimistic_grid(
+                data,
+                task.frame,
+                span,
+                STAGE_COUNT,
+                shrink=SPHERE_REDUCTION_FACTOR,
+                spread=GROUND_SPREAD_STEPS,
+                ratio=SPACING_ACROSS_STEPS,
+            )
+            grid_routes = side_routes(data, task.frame, grid, bound, MAX_ROUTES)
+            routes = [resample(task.frame.to_world(route.points), count) for route in grid_routes]
         end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
         spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
         for clearance_fraction, travel in product(CLEARANCE_FRACTIONS, (data.travel, task.travel)):
@@ -365,30 +381,6 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
                 # Shorten again from equal legs, as for the default plan.
                 path, _ = shorten_path(preferred_problem, resample(path, count))
                 yield path
-
-
-def _list_routes(data: ProblemArrays, frame: RotatedFrame, default: Floats) -> list[Floats]:
-    """Return candidate routes that pass the missile spheres and zones on different sides, each (w, 3), m.
-
-    frame: frame whose axis runs from the start to the destination.
-    default: the path of the default plan, (w, 3), m; it sets the number of waypoints and the maximum length.
-    """
-    count, bound = len(default), MAX_LENGTH_RATIO * float(path_length(default))
-    span = (-0.5 * bound, 0.5 * bound)
-    if is_limited(data.airspace):
-        zone_routes = airspace_routes(data, frame, span, ZONE_GRIDS)
-        return [fit_waypoints(data, frame, route.points, count, QUICK_FIT) for route in zone_routes]
-    grid = optimistic_grid(
-        data,
-        frame,
-        span,
-        STAGE_COUNT,
-        shrink=SPHERE_REDUCTION_FACTOR,
-        spread=GROUND_SPREAD_STEPS,
-        ratio=SPACING_ACROSS_STEPS,
-    )
-    routes = side_routes(data, frame, grid, bound, MAX_ROUTES)
-    return [resample(frame.to_world(route.points), count) for route in routes]
 
 
 # --- The search ---

@@ -378,7 +378,22 @@ class Search:
             if certificate.kill_distance < self.required_distance - MAX_MISSING_DISTANCE_M:
                 break
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
-        return self._shorten_again(path)
+        # Shorten the path once more, from equal legs, and then with narrow margins, if it is clearly shorter than the
+        # best safe path. Without a safe path nothing is done, because the search then tries narrow margins later.
+        if not self.has_safe():
+            return False
+        max_length = (1.0 - NARROW_GAIN_FRACTION) * self.length_ratio() * self._straight_length()
+        for problem in (self.problem, with_narrow_margins(self.problem)):
+            if path_length(path) >= max_length:
+                break
+            if self._evaluation_budget() - self.evaluations < MAX_MODELS:
+                self.budget_exhausted = True
+                break
+            path, evaluations = shorten_path(problem.search, resample(path, len(path)), pause=self.pause)
+            self.evaluations += evaluations
+            if path_length(path) < max_length and self.keep_if_finished(path, certify(self.problem, path)):
+                return True
+        return False
 
     def keep_if_finished(self, path: Floats, certificate: Certificate) -> bool:
         """If a path (w, 3) meets the goal, store it as the shortest path, report it, and return True."""
@@ -388,30 +403,6 @@ class Search:
         if self.improved is not None:
             self.improved(path)
         return True
-
-    def _shorten_again(self, path: Floats) -> bool:
-        """Shorten a path (w, 3) that is not finished once more: from equal legs, and then with narrow margins.
-
-        Keep the result, and return True, if it is finished and clearly shorter than the best safe path. Without a safe
-        path nothing is done, because the search then tries narrow margins later.
-        """
-        if not self.has_safe():
-            return False
-        max_length = (1.0 - NARROW_GAIN_FRACTION) * self.length_ratio() * self._straight_length()
-        if path_length(path) >= max_length:
-            return False
-        for problem in (self.problem, with_narrow_margins(self.problem)):
-            if self._evaluation_budget() - self.evaluations < MAX_MODELS:
-                self.budget_exhausted = True
-                return False
-            path, evaluations = shorten_path(problem.search, resample(path, len(path)), pause=self.pause)
-            self.evaluations += evaluations
-            if path_length(path) >= max_length:
-                return False
-            certificate = certify(self.problem, path)
-            if self.keep_if_finished(path, certificate):
-                return True
-        return False
 
     def must_end(self) -> bool:
         """Return True if the search is stopped or its budget is exhausted, and record the reason."""

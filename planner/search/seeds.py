@@ -211,7 +211,24 @@ def search_other_sides(search: Search) -> None:
         return
     tried_paths = _try_grids(search, GRIDS)
     if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS_FRACTION:
-        tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling_routes(search)
+        tried_paths += _try_grids(search, FINER_GRIDS)
+        # Routes at the altitude of the ceiling, one for each step of the lattice and for each depth by which it may
+        # enter missiles' spheres. A route close to an earlier one is left out.
+        frame = rotated_frame(search.problem.space.start, search.problem.space.destination)
+        ceiling_paths: list[Floats] = []
+        for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS_M):
+            if search.must_end():
+                break
+            data = _close_narrow_places(search, step, step + depth)
+            route = ceiling_route(data, frame, step, depth, search.pause)
+            if not len(route):
+                continue
+            path = resample(route, search.encoding.waypoints)
+            distances = [np.sqrt(((path - other) ** 2).sum(axis=1)).mean() for other in ceiling_paths]
+            if min(distances, default=math.inf) > SAME_PATH_DISTANCE_M:
+                ceiling_paths.append(path)
+                search.shorten(path)
+        tried_paths += ceiling_paths
     if not search.has_safe():
         # No path is safe with the usual margins: shorten the tried ones with narrow margins.
         usual_problem = search.problem
@@ -273,31 +290,6 @@ def _close_narrow_places(search: Search, step: float, kill_radius: float) -> Pro
         if all(math.dist(place, other) > step for other in places):
             places.append(place)
     return close_places(data, np.array(places), kill_radius) if places else data
-
-
-def _try_ceiling_routes(search: Search) -> list[Floats]:
-    """Shorten routes at the altitude of the ceiling; return the routes as paths (w, 3).
-
-    A route is searched for each step of the lattice, and for each depth by which it may enter missiles' spheres. It
-    avoids the places where a shortened path has remained too close to a missile. A route close to an earlier one is
-    left out.
-    """
-    frame = rotated_frame(search.problem.space.start, search.problem.space.destination)
-    tried_paths: list[Floats] = []
-    for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS_M):
-        if search.must_end():
-            break
-        data = _close_narrow_places(search, step, step + depth)
-        route = ceiling_route(data, frame, step, depth, search.pause)
-        if not len(route):
-            continue
-        path = resample(route, search.encoding.waypoints)
-        if all(
-            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE_M for tried_path in tried_paths
-        ):
-            tried_paths.append(path)
-            search.shorten(path)
-    return tried_paths
 
 
 def shorten_best(search: Search) -> None:
