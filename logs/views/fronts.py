@@ -71,7 +71,7 @@ def front_map(front: Front) -> MapChart:
         scenario,
         f"front of {count_text(len(paths), 'plan')} from above",
         layers,
-        [*labels, *end_labels(scenario, route=None, stops=())],
+        [*labels, *end_labels(scenario, route=None, numbers_of_waypoints=())],
         map_extent(scenario, route=None, paths=paths),
         route=shortest,
         winds=(NamedWind(scenario.wind),),

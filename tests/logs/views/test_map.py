@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.mission.itinerary import NO_ITEM
 from logs import theme
 from logs.verdict.places import Place
 from logs.views.charts import Layer, legend_entries
@@ -237,6 +238,14 @@ def test_the_page_has_the_flights_moments_instead_of_its_points() -> None:
     flown = [layer for layer in made["layers"] if "flight" in layer]
     assert [(layer["role"], layer["flight"], "x" in layer) for layer in flown] == [("flown", 0, False)]
     assert [label[0] for label in made["labels"]] == ["0 start", "3 destination", "1", "2"]
+
+
+def test_waypoints_have_the_numbers_of_their_mission_items() -> None:
+    """A suggestion names items, so that the number beside a waypoint is its item's; home is no item."""
+    arguments = ALL | {"items": [NO_ITEM, 3, 4, 7]}
+    made = map_json(flight_map(make_scenario(), **arguments, track=make_track(), verdict=None))
+    assert [label[0] for label in made["labels"]] == ["start", "7 destination", "3", "4"]
+    assert "waypoint, with the number of its mission item" in [layer["name"] for layer in made["layers"]]
 
 
 def test_a_way_that_ends_where_it_began_has_one_label_there() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.mission.itinerary import NO_ITEM
 from logs import theme
 from logs.verdict.places import Place
 from logs.views.draw_scene import Projection, draw_scene
@@ -51,12 +52,13 @@ def legend(figure: Any) -> set[str]:
     return {text.get_text() for text in figure.legends[0].get_texts()}
 
 
-def test_waypoints_have_the_numbers_of_their_stops() -> None:
+def test_waypoints_have_the_numbers_of_their_mission_items() -> None:
+    """As in a suggestion, "move item 3 up": a loiter of two waypoints is one item, and home is none."""
     setup = make_setup()
-    setup = replace(setup, route=setup.route.with_fields(stop=[0, 1, 1, 2]))
+    setup = replace(setup, route=setup.route.with_fields(stop=[0, 1, 1, 2], item=[NO_ITEM, 3, 3, 7]))
     names = {text.get_text() for text in drawn(setup, make_track(), None).axes[0].texts}
-    assert {"0 start", "1", "2 destination"} <= names
-    assert not {"2", "3 destination"} & names
+    assert {"start", "3", "7 destination"} <= names
+    assert not {"0 start", "1", "2", "2 destination"} & names
 
 
 def test_what_is_there_is_drawn_and_named() -> None:
