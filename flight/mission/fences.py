@@ -168,7 +168,13 @@ def fence_problem(
         lat, lon = [corner.lat_deg for corner in shape], [corner.lon_deg for corner in shape]
         corners_east, corners_north = to_map(origin, lat, lon)
         if item.command in POLYGONS:
-            is_inside = _is_in_polygon(np.asarray(corners_east), np.asarray(corners_north), east, north)
+            # A ray to the east crosses the polygon's edges an odd number of times if it starts inside.
+            start_east, start_north = np.asarray(corners_east), np.asarray(corners_north)
+            end_east, end_north = np.roll(start_east, -1), np.roll(start_north, -1)
+            is_crossed = (start_north > north) != (end_north > north)
+            north_extent = np.where(is_crossed, end_north - start_north, 1.0)
+            crossing_east = start_east + (north - start_north) / north_extent * (end_east - start_east)
+            is_inside = bool((is_crossed & (crossing_east > east)).sum() % 2)
             name = "polygon"
         else:
             is_inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
@@ -268,19 +274,6 @@ def number_items(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     [0, 1]
     """
     return tuple(replace(item, seq=k) for k, item in enumerate(items))
-
-
-def _is_in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
-    """Return True if a position is inside a polygon.
-
-    A ray to the east crosses the polygon's edges an odd number of times if it starts inside.
-    """
-    start_east, start_north = corners_east, corners_north
-    end_east, end_north = np.roll(start_east, -1), np.roll(start_north, -1)
-    is_crossed = (start_north > north) != (end_north > north)
-    north_extent = np.where(is_crossed, end_north - start_north, 1.0)
-    crossing_east = start_east + (north - start_north) / north_extent * (end_east - start_east)
-    return bool((is_crossed & (crossing_east > east)).sum() % 2)
 
 
 # ----------------------------------------------------------------------

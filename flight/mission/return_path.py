@@ -234,7 +234,9 @@ def choose_target(
     landing = None
     if rules.may_use_landing:
         landing = next((sequence for sequence in landings if sequence.landing is not None), None)
-    home_target = _home_target(rules, start, home)
+    transit, end = _transit_and_end_altitudes(rules, start, home.up, rules.height)
+    position, home_distance = (home.east, home.north, end), _distance(start, home)
+    home_target = ReturnTarget(position, "home", "", home_distance, transit_altitude=transit)
     if landing is not None:
         return _nearest_with_landing(rules, start, home_target, rally, landing)
     if not rally:
@@ -258,12 +260,6 @@ def choose_target(
         )
     rally_text = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     return rally_target(rules, start, rally[index])._replace(name=name, reason=f"the nearest {rally_text}")
-
-
-def _home_target(rules: ReturnRules, start: Position, home: ReturnPoint) -> ReturnTarget:
-    """Return home as the destination of an RTL from a start."""
-    transit, end = _transit_and_end_altitudes(rules, start, home.up, rules.height)
-    return ReturnTarget((home.east, home.north, end), "home", "", _distance(start, home), transit_altitude=transit)
 
 
 def rally_target(rules: ReturnRules, start: Position, point: ReturnPoint) -> ReturnTarget:

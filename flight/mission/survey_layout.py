@@ -303,8 +303,14 @@ def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, orig
     It is impossible if the lines differ in altitude, if a line bends, or if no new line is long enough.
     """
     waypoint_items = [item for line in lines for item in line.point_items]
-    if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
+    if len({(item.frame, item.alt) for item in waypoint_items}) != 1:
         return None
+    for line in lines:
+        # A line bends if it deviates from the straight line between its ends.
+        start, step = line.corners[0], line.corners[-1] - line.corners[0]
+        offsets = (line.corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
+        if np.abs(offsets).max() > _BEND_TOLERANCE_M:
+            return None
     hull = convex_hull(np.concatenate([line.corners for line in lines]))
     if hull is None:
         return None
@@ -352,13 +358,6 @@ def convex_hull(points: Floats) -> Floats | None:
             chain.append([x, y])
         hull += chain[:-1]
     return np.array(hull) if len(hull) > 2 else None
-
-
-def _is_bent(corners: Floats) -> bool:
-    """Return True if a line deviates from the straight line between its ends by more than `_BEND_TOLERANCE_M`."""
-    start, step = corners[0], corners[-1] - corners[0]
-    lateral_offsets = (corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
-    return bool(np.abs(lateral_offsets).max() > _BEND_TOLERANCE_M)
 
 
 def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -> tuple[float, float] | None:

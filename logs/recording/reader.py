@@ -300,7 +300,14 @@ def read_log(path: Path | str) -> FlightLog:
         if path.exists() and not path.is_file():
             raise LogError(f"{path}: {missing_text(path)}; expected a flight log (.mcap)", file=path)
         with path.open("rb") as file:
-            _check_magic(file.read(len(MAGIC)), path)
+            magic = file.read(len(MAGIC))
+            if not magic:
+                raise LogError(f"{path}: empty; expected a flight log (.mcap)", file=path)
+            if magic != MAGIC:
+                problem = f"not an MCAP file (it starts with {magic!r}); expected a flight log"
+                if is_imported_log(path):
+                    problem = f"a log of another program; `planfly import {path}` converts it to a flight log"
+                raise LogError(f"{path}: {problem}", file=path)
             for data in read_chunks(file, container):
                 try:
                     messages.add(data)
@@ -354,17 +361,6 @@ def read_log(path: Path | str) -> FlightLog:
         lost=loss,
         reference=reference,
     )
-
-
-def _check_magic(magic: bytes, path: Path) -> None:
-    """Raise LogError if a file does not begin like an MCAP file."""
-    if not magic:
-        raise LogError(f"{path}: empty; expected a flight log (.mcap)", file=path)
-    if magic != MAGIC:
-        if is_imported_log(path):
-            advice = f"`planfly import {path}` converts it to a flight log"
-            raise LogError(f"{path}: a log of another program; {advice}", file=path)
-        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}); expected a flight log", file=path)
 
 
 def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords, str]:

@@ -50,32 +50,27 @@ def suites_text(suites: Iterable[JunitSuite]) -> str:
             errors=str(counts["error"]),
             skipped=str(counts["skipped"]),
         )
-        element.extend(_case_element(case, suite.name) for case in suite.cases)
+        for case in suite.cases:
+            # The class name contains the suite, because many programs distinguish cases only by class and name.  Dots
+            # in the suite's name are replaced, because these programs split a class at its dots.
+            package, *rule = case.classname.split(".")
+            class_name = ".".join([package, suite.name.replace(".", "_"), *rule])
+            case_element = ElementTree.SubElement(
+                element,
+                "testcase",
+                classname=_without_control_characters(class_name),
+                name=_without_control_characters(case.name),
+            )
+            text = _without_control_characters(case.text, keep="\n") or None
+            if case.result != "passed":
+                message = _without_control_characters(case.message)
+                ElementTree.SubElement(case_element, case.result, message=message).text = text
+            elif text:
+                ElementTree.SubElement(case_element, "system-out").text = text
         if suite.output:
             ElementTree.SubElement(element, "system-out").text = _without_control_characters(suite.output, keep="\n")
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _case_element(case: JunitCase, suite_name: str) -> ElementTree.Element:
-    """Make the XML element of a test case.
-
-    The class name contains the suite, because many programs distinguish cases only by class and name.  Dots in the
-    suite's name are replaced, because these programs split a class at its dots.
-    """
-    package, *rule = case.classname.split(".")
-    element = ElementTree.Element(
-        "testcase",
-        classname=_without_control_characters(".".join([package, suite_name.replace(".", "_"), *rule])),
-        name=_without_control_characters(case.name),
-    )
-    text = _without_control_characters(case.text, keep="\n") or None
-    if case.result != "passed":
-        result = ElementTree.SubElement(element, case.result, message=_without_control_characters(case.message))
-        result.text = text
-    elif text:
-        ElementTree.SubElement(element, "system-out").text = text
-    return element
 
 
 def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...], *, passes: bool) -> JunitSuite:

@@ -349,7 +349,14 @@ def summary_lines(
     if level == "geometric":
         lines.append("Level: geometric (judged by the route and the aircraft's envelope, without a flight)")
     for answer in other_answers:
-        agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
+        # The findings on which the verdict and another level differ, or a statement that they agree.
+        texts = list(map(disagreement_text, answer.disagreements[:_MAX_NAMED_FINDINGS]))
+        if len(answer.disagreements) > _MAX_NAMED_FINDINGS:
+            texts.append(f"and {len(answer.disagreements) - _MAX_NAMED_FINDINGS} more")
+        if not texts:
+            agreed_text = "flight and geometry agree on every finding that both judge"
+            texts = [agreed_text if answer.name == "geometry" else "both flights agree"]
+        agreement = f"; {'; '.join(texts)}" if level == "flown" else ""
         if answer.name == "airframe" and failed_at_take_off(findings):
             agreement = "; it begins in the air, after the take-off that failed"
         lines.append(f"{_LEVEL_TITLES[answer.name]}: {answer.headline}{agreement}")
@@ -489,15 +496,3 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
         " m with that error subtracted"
         f" ({required_clearance:g} m are required)"
     ]
-
-
-def _agreement_text(other_level: LevelAnswer) -> str:
-    """Describe the findings on which the verdict and another level differ, or state that they agree."""
-    disagreements = other_level.disagreements
-    if not disagreements:
-        is_geometry = other_level.name == "geometry"
-        return "flight and geometry agree on every finding that both judge" if is_geometry else "both flights agree"
-    rest_text = (
-        f"; and {len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""
-    )
-    return "; ".join(map(disagreement_text, disagreements[:_MAX_NAMED_FINDINGS])) + rest_text

@@ -173,6 +173,8 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 def _make_folder(args: argparse.Namespace) -> int:
     """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
+    from aircraft.uncertainty import read_uncertainty
+    from flight.dynamics.envelope_tables import load_envelope
     from planfly.api import aircraft as aircraft_api
 
     if args.name is not None:
@@ -192,7 +194,26 @@ def _make_folder(args: argparse.Namespace) -> int:
     origin_text = "from a data sheet" if has_sheet else f"as {Path(args.source or 'aerosonde').name}"
     print(f"aircraft  {folder_text}/ ({', '.join(files)}), {origin_text}")
     if has_sheet:
-        _print_data_sheet_performance(new_aircraft)
+        # The performance of the data sheet's model, and its uncertainty.
+        envelope = load_envelope(new_aircraft)
+        climb, descent = (math.degrees(angle) for angle in envelope.air_angles(new_aircraft.airspeed, 500.0))
+        uncertainty = read_uncertainty(new_aircraft.folder)
+        print(
+            f"  speed    cruise {new_aircraft.airspeed:g} m/s, stall {new_aircraft.stall_speed:g}, fastest level flight"
+            f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {new_aircraft.airspeed_max:g} m/s"
+        )
+        if uncertainty is not None:
+            climb_sd = math.degrees(uncertainty.climb_sd)
+            descent_sd = math.degrees(uncertainty.descent_sd)
+            print(
+                f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
+                f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
+            )
+            power = envelope.power(new_aircraft.airspeed, 500.0, 0.0)
+            lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power_sd) for sign in (-1.0, 1.0))
+            source = "from the battery" if new_aircraft.battery_voltage else "of fuel heat"
+            print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
+        print("  guessed  README.md lists the guessed values and their possible error")
     if args.params is not None:
         _print_parameters(args, new_aircraft)
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
@@ -309,32 +330,6 @@ def _print_uncertain_properties(result: "IdentifiedAircraft") -> None:
             f"  current  not used, because {log_name} has no current (BAT); identify from the other logs alone to use"
             " their current"
         )
-
-
-def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
-    """Print the performance of a data sheet's model, and its uncertainty."""
-    from aircraft.uncertainty import read_uncertainty
-    from flight.dynamics.envelope_tables import load_envelope
-
-    envelope = load_envelope(aircraft)
-    climb, descent = (math.degrees(angle) for angle in envelope.air_angles(aircraft.airspeed, 500.0))
-    uncertainty = read_uncertainty(aircraft.folder)
-    print(
-        f"  speed    cruise {aircraft.airspeed:g} m/s, stall {aircraft.stall_speed:g}, fastest level flight"
-        f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {aircraft.airspeed_max:g} m/s"
-    )
-    if uncertainty is not None:
-        climb_sd = math.degrees(uncertainty.climb_sd)
-        descent_sd = math.degrees(uncertainty.descent_sd)
-        print(
-            f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
-            f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
-        )
-        power = envelope.power(aircraft.airspeed, 500.0, 0.0)
-        lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power_sd) for sign in (-1.0, 1.0))
-        source = "from the battery" if aircraft.battery_voltage else "of fuel heat"
-        print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
-    print("  guessed  README.md lists the guessed values and their possible error")
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:

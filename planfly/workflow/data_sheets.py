@@ -383,7 +383,15 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         bank_guessed="bank" in sized.guessed,
         climb_shortfall=sized.climb_shortfall,
     )
-    return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
+    # In the drawn aircraft, too, the factor on thrust compensates the effect of the other factors on the climb.
+    draws = draw_quantities(quantities)
+    logarithms, names = np.log(draws.values), [name.removeprefix("ident/") for name in draws.names]
+    thrust = names.index("thrust")
+    logarithms[:, thrust] *= climb_sd / thrust_slopes[0] / spreads["thrust"]
+    for k, name in enumerate(names):
+        if k != thrust:
+            logarithms[:, thrust] += balance[name] * logarithms[:, k]
+    return uncertainty, replace(draws, values=np.exp(logarithms).round(6))
 
 
 def climb_deviation(sized: SizedAircraft) -> float:
@@ -398,26 +406,6 @@ def climb_deviation(sized: SizedAircraft) -> float:
         return STATED_CLIMB_SD_RAD
     extrapolated_sd = EXTRAPOLATED_CLIMB_SD_FRACTION * (sized.sheet.climb - sized.partial_climb)
     return min(GUESSED_CLIMB_SD_RAD, math.hypot(STATED_CLIMB_SD_RAD, extrapolated_sd))
-
-
-def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
-    """Draw the factors of `DRAW_COUNT` aircraft.
-
-    The factor on thrust compensates the effect of the other factors on the climb.
-
-    balance: change of the logarithm of the thrust per logarithm of each other factor.
-    thrust_sd: standard deviation of the logarithm of the thrust that represents the uncertainty of the climb.
-    """
-    draws = draw_quantities(uncertainty.quantities)
-    logarithms = np.log(draws.values)
-    names = [name.removeprefix("ident/") for name in draws.names]
-    thrust = names.index("thrust")
-    scale = thrust_sd / next(quantity.sd for quantity in uncertainty.quantities if quantity.name == "ident/thrust")
-    logarithms[:, thrust] *= scale
-    for k, name in enumerate(names):
-        if k != thrust:
-            logarithms[:, thrust] += balance[name] * logarithms[:, k]
-    return replace(draws, values=np.exp(logarithms).round(6))
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:

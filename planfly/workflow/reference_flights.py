@@ -83,7 +83,19 @@ def find_passing_parameter(
         # No flight parameter changes the rejection of a mission.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
-    for candidate in _candidates_to_try(autopilot, failed_finding.rule, findings, only_reached_limits):
+    deviations = autopilot.deviations
+    vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
+    measured = {fact.what for finding in findings for fact in finding.facts}
+    if only_reached_limits:
+        throttle_parameter = autopilot.speeds.max_throttle_name.split(" ")[0] if FULL_THROTTLE_TIME in measured else ""
+        vertical_candidates = tuple(one for one in vertical_candidates if one.name == throttle_parameter)
+        lateral_candidates = ()
+    if PITCH_LIMIT_TIME in measured:
+        vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
+    candidates = (*lateral_candidates, *vertical_candidates)
+    if failed_finding.rule in _VERTICAL_RULES:
+        candidates = (*vertical_candidates, *lateral_candidates)
+    for candidate in candidates:
         current = values[candidate.name]
 
         def passes_with_value(value: float, candidate: Candidate = candidate) -> bool:
@@ -105,24 +117,6 @@ def find_passing_parameter(
                 deviation,
             )
     return None
-
-
-def _candidates_to_try(
-    autopilot: Autopilot, rule: str, findings: tuple[Finding, ...], only_reached_limits: bool
-) -> tuple[Candidate, ...]:
-    """Return the parameters to try for a failure of a rule, in order; see `find_passing_parameter`."""
-    deviations = autopilot.deviations
-    vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
-    measured = {fact.what for finding in findings for fact in finding.facts}
-    if only_reached_limits:
-        throttle_parameter = autopilot.speeds.max_throttle_name.split(" ")[0] if FULL_THROTTLE_TIME in measured else ""
-        vertical_candidates = tuple(one for one in vertical_candidates if one.name == throttle_parameter)
-        lateral_candidates = ()
-    if PITCH_LIMIT_TIME in measured:
-        vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
-    if rule in _VERTICAL_RULES:
-        return (*vertical_candidates, *lateral_candidates)
-    return (*lateral_candidates, *vertical_candidates)
 
 
 def _nearest_passing_value(
