@@ -50,32 +50,26 @@ def suites_text(suites: Iterable[JunitSuite]) -> str:
             errors=str(counts["error"]),
             skipped=str(counts["skipped"]),
         )
-        element.extend(_case_element(case, suite.name) for case in suite.cases)
+        for case in suite.cases:
+            # The class name contains the suite, because many programs distinguish cases only by class and name.  Dots
+            # in the suite's name are replaced, because these programs split a class at its dots.
+            package, *rule = case.classname.split(".")
+            case_element = ElementTree.SubElement(
+                element,
+                "testcase",
+                classname=_without_control_characters(".".join([package, suite.name.replace(".", "_"), *rule])),
+                name=_without_control_characters(case.name),
+            )
+            text = _without_control_characters(case.text, keep="\n") or None
+            if case.result != "passed":
+                message = _without_control_characters(case.message)
+                ElementTree.SubElement(case_element, case.result, message=message).text = text
+            elif text:
+                ElementTree.SubElement(case_element, "system-out").text = text
         if suite.output:
             ElementTree.SubElement(element, "system-out").text = _without_control_characters(suite.output, keep="\n")
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _case_element(case: JunitCase, suite_name: str) -> ElementTree.Element:
-    """Make the XML element of a test case.
-
-    The class name contains the suite, because many programs distinguish cases only by class and name.  Dots in the
-    suite's name are replaced, because these programs split a class at its dots.
-    """
-    package, *rule = case.classname.split(".")
-    element = ElementTree.Element(
-        "testcase",
-        classname=_without_control_characters(".".join([package, suite_name.replace(".", "_"), *rule])),
-        name=_without_control_characters(case.name),
-    )
-    text = _without_control_characters(case.text, keep="\n") or None
-    if case.result != "passed":
-        result = ElementTree.SubElement(element, case.result, message=_without_control_characters(case.message))
-        result.text = text
-    elif text:
-        ElementTree.SubElement(element, "system-out").text = text
-    return element
 
 
 def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...], *, passes: bool) -> JunitSuite:
@@ -87,7 +81,21 @@ def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...]
     A failed finding becomes a failure, and an unjudged finding a skipped test case.  The test case ``verdict`` fails
     unless the answer is "flyable", even if no finding failed and a part was just not judged.
     """
-    cases = [answer_case("" if passes else "".join(lines[:1])), *_finding_cases(findings)]
+    cases = [answer_case("" if passes else "".join(lines[:1]))]
+    counts: Counter[tuple[str, str]] = Counter()
+    for finding in findings:
+        place = _without_control_characters(finding.where)
+        counts[finding.rule, place] += 1
+        # Names of cases must be unique.
+        number = counts[finding.rule, place]
+        case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
+        if finding.state == "fail":
+            message = f"{finding_words(finding).word}: {finding.reason}"
+            text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
+            case = case._replace(result="failure", message=message, text=text)
+        elif finding.state != "ok":
+            case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
+        cases.append(case)
     return JunitSuite(name, cases, "\n".join(lines))
 
 
@@ -106,26 +114,6 @@ def answer_case(reason: str) -> JunitCase:
     reason: reason why the answer fails; "" if it passes.
     """
     return JunitCase("planfly", "verdict", "failure" if reason else "passed", reason)
-
-
-def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
-    """Make one test case, with a unique name, for each finding; an unjudged finding is "skipped"."""
-    counts: Counter[tuple[str, str]] = Counter()
-    cases = []
-    for finding in findings:
-        place = _without_control_characters(finding.where)
-        counts[finding.rule, place] += 1
-        # Names of cases must be unique.
-        number = counts[finding.rule, place]
-        case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
-        if finding.state == "fail":
-            message = f"{finding_words(finding).word}: {finding.reason}"
-            text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
-            case = case._replace(result="failure", message=message, text=text)
-        elif finding.state != "ok":
-            case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
-        cases.append(case)
-    return cases
 
 
 def _without_control_characters(text: str, keep: str = "") -> str:
