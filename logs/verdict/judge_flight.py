@@ -15,7 +15,7 @@ from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import judge_geometry, judge_plan_only, judge_unflown
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import flown_phases, leg_ends
-from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
+from logs.verdict.places import Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
 from logs.verdict.rules.registry import (
     blocking_item_findings,
@@ -116,8 +116,22 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
     setup = requirements.setup
     findings = with_passing_suggestions(verdict.findings, reference.tried)
     *other_levels, own_level = verdict.levels
-    if requirements.envelope and reference.airframe is not None:
-        other_levels.append(_airframe_level(reference.airframe, findings))
+    airframe = reference.airframe
+    if requirements.envelope and airframe is not None:
+        # A flight that failed at take-off is not compared, because the reference flight begins in the air.
+        is_compared = not failed_at_take_off(findings)
+        failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
+        airframe_findings = [
+            replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed)
+            for finding in findings
+            if is_compared and finding.rule not in GROUND_RULES
+        ]
+        disagreements = _disagreements("airframe", airframe_findings, findings)
+        # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
+        is_undecided = not airframe.flyable and not airframe.failed
+        other_levels.append(
+            LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
+        )
     levels = (*other_levels, own_level)
     deciding = None if verdict.flyable else reference.deciding
     lines = summary_lines(findings, setup, "flown", levels, judging_conditions(setup), deciding)
@@ -127,25 +141,6 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
 def _has_failed(findings: Sequence[Finding]) -> bool:
     """Return True if a finding has failed."""
     return any(finding.ok is False for finding in findings)
-
-
-def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
-    """Return the answer of the level "airframe", which states if the reference flight is flyable.
-
-    The answer lists the findings that the judged flight decides differently.
-
-    A flight that failed at take-off is not compared, because the reference flight begins in the air.
-    """
-    failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
-    airframe_findings = [
-        replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed)
-        for finding in flight_findings
-        if finding.rule not in GROUND_RULES and not failed_at_take_off(flight_findings)
-    ]
-    disagreements = _disagreements("airframe", airframe_findings, flight_findings)
-    # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
-    is_undecided = not airframe.flyable and not airframe.failed
-    return LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
 
 
 def _disagreements(

@@ -82,7 +82,21 @@ def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...]
     A failed finding becomes a failure, and an unjudged finding a skipped test case.  The test case ``verdict`` fails
     unless the answer is "flyable", even if no finding failed and a part was just not judged.
     """
-    cases = [answer_case("" if passes else "".join(lines[:1])), *_finding_cases(findings)]
+    cases = [answer_case("" if passes else "".join(lines[:1]))]
+    counts: Counter[tuple[str, str]] = Counter()
+    for finding in findings:
+        place = _without_control_characters(finding.where)
+        counts[finding.rule, place] += 1
+        # Names of cases must be unique.
+        number = counts[finding.rule, place]
+        case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
+        if finding.state == "fail":
+            message = f"{finding_words(finding).word}: {finding.reason}"
+            text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
+            case = case._replace(result="failure", message=message, text=text)
+        elif finding.state != "ok":
+            case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
+        cases.append(case)
     return JunitSuite(name, cases, "\n".join(lines))
 
 
@@ -101,26 +115,6 @@ def answer_case(reason: str) -> JunitCase:
     reason: reason why the answer fails; "" if it passes.
     """
     return JunitCase("planfly", "verdict", "failure" if reason else "passed", reason)
-
-
-def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
-    """Make one test case, with a unique name, for each finding; an unjudged finding is "skipped"."""
-    counts: Counter[tuple[str, str]] = Counter()
-    cases = []
-    for finding in findings:
-        place = _without_control_characters(finding.where)
-        counts[finding.rule, place] += 1
-        # Names of cases must be unique.
-        number = counts[finding.rule, place]
-        case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
-        if finding.state == "fail":
-            message = f"{finding_words(finding).word}: {finding.reason}"
-            text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
-            case = case._replace(result="failure", message=message, text=text)
-        elif finding.state != "ok":
-            case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
-        cases.append(case)
-    return cases
 
 
 def _without_control_characters(text: str, keep: str = "") -> str:

@@ -299,7 +299,22 @@ def suggest_gentler_turn(
             alternatives.append(
                 (1.0 - speed / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
             )
-        alternatives += _longer_legs(requirements, corner)
+        # Longer legs, with room for this turn and the neighbouring turns.
+        longer_legs = []
+        relative_growth = 0.0
+        for leg in (corner - 1, corner):
+            needed_length = (
+                requirements.length_after[leg]
+                + requirements.length_before[leg + 1]
+                + requirements.reversal[leg]
+                + SUGGESTION_LENGTH_MARGIN_M
+            )
+            leg_length = float(requirements.runs[leg])
+            if math.isfinite(needed_length) and needed_length > leg_length:
+                wanted_length = float(math.ceil(needed_length))
+                longer_legs.append(Change("length", requirements.leg(leg), leg_length, wanted_length, "m"))
+                relative_growth = max(relative_growth, needed_length / leg_length - 1.0)
+        alternatives += [(relative_growth, tuple(longer_legs))] if longer_legs else []
     degrees = _gentler_turn(requirements, corner, max_turn)
     if degrees > 0.0:
         change = Change("turn", place, math.degrees(planned_turn), degrees, "deg")
@@ -342,30 +357,6 @@ def suggest_larger_loiter(
         lambda radius: radius_of(replace(loiter, radius=math.copysign(radius, loiter.radius))) >= needed_radius,
     )
     return () if radius is None else ((Change("radius", finding.place, abs(loiter.radius), radius, "m"),),)
-
-
-def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
-    """Suggest longer legs at a corner, with room for its turn and the neighbouring turns; [] if all fit."""
-    needed_before = (
-        requirements.length_before[corner]
-        + requirements.length_after[corner - 1]
-        + requirements.reversal[corner - 1]
-        + SUGGESTION_LENGTH_MARGIN_M
-    )
-    needed_after = (
-        requirements.length_after[corner]
-        + requirements.length_before[corner + 1]
-        + requirements.reversal[corner]
-        + SUGGESTION_LENGTH_MARGIN_M
-    )
-    changes = []
-    relative_growth = 0.0
-    for leg, needed_length in ((corner - 1, needed_before), (corner, needed_after)):
-        leg_length = float(requirements.runs[leg])
-        if math.isfinite(needed_length) and needed_length > leg_length:
-            changes.append(Change("length", requirements.leg(leg), leg_length, float(math.ceil(needed_length)), "m"))
-            relative_growth = max(relative_growth, needed_length / leg_length - 1.0)
-    return [(relative_growth, tuple(changes))] if changes else []
 
 
 def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float) -> float:
@@ -589,6 +580,10 @@ def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
     return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
 
 
+# Step in which the altitude of an RTL is suggested, m.
+RTL_ALTITUDE_STEP_M = 1.0
+
+
 def suggest_flying_higher(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
@@ -622,7 +617,23 @@ def suggest_flying_higher(
         return ((*home_on_ground[0], raised),)
     suggestions = list(_suggest_other_frame(setup, Frame.GLOBAL_RELATIVE_ALT))
     if finding.place.index in setup.route.rtl_legs:
-        return (*suggestions, *_suggest_higher_return(requirements, shortfall))
+        # Each of these changes alone may need more than the shortfall: a higher RTL altitude by a parameter, a higher
+        # waypoint where the RTL begins, or both.
+        start, returns = setup.route.rtl_start, setup.autopilot.model.returns
+        # An RTL that keeps the altitude of its start has no altitude of its own.
+        values = {} if math.isnan(returns.rules.height) else next(iter(returns.trials.altitudes), {})
+        wanted = RTL_ALTITUDE_STEP_M * math.ceil((next(iter(values.values()), 0.0) + shortfall) / RTL_ALTITUDE_STEP_M)
+        higher_end = tuple(
+            Change("parameter", FLIGHT, value, wanted, "m", parameter=name)
+            for name, value in values.items()
+            if value < wanted
+        )
+        placed_items = {item.seq for item in setup.mission.items if item.command in PLACES}
+        higher_start: Suggestion = ()
+        if start is not None and int(setup.route.items[start]) in placed_items:
+            higher_start = (Change("height", requirements.waypoint(start), None, _round_to_meter(shortfall), "m"),)
+        both = (*higher_end, *higher_start) if higher_end and higher_start else ()
+        return (*suggestions, *(suggestion for suggestion in (higher_end, both, higher_start) if suggestion))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
         suggestions.append(
             (Change("height", finding.place, current=None, wanted=_round_to_meter(shortfall), unit="m"),)
@@ -632,33 +643,6 @@ def suggest_flying_higher(
         # A change that lets several legs follow the ground is tried before single legs are raised.
         suggestions.insert(0 if len(following) > 1 else len(suggestions), following)
     return tuple(suggestions)
-
-
-# Step in which the altitude of an RTL is suggested, m.
-RTL_ALTITUDE_STEP_M = 1.0
-
-
-def _suggest_higher_return(requirements: RouteRequirements, shortfall: float) -> tuple[Suggestion, ...]:
-    """Suggest flying an RTL higher: by a parameter, by raising the waypoint where it begins, or by both.
-
-    shortfall: missing height above ground, m; each change alone may need more.
-    """
-    setup, start = requirements.setup, requirements.setup.route.rtl_start
-    returns = setup.autopilot.model.returns
-    # An RTL that keeps the altitude of its start has no altitude of its own.
-    values = {} if math.isnan(returns.rules.height) else next(iter(returns.trials.altitudes), {})
-    wanted = RTL_ALTITUDE_STEP_M * math.ceil((next(iter(values.values()), 0.0) + shortfall) / RTL_ALTITUDE_STEP_M)
-    higher_end = tuple(
-        Change("parameter", FLIGHT, value, wanted, "m", parameter=name)
-        for name, value in values.items()
-        if value < wanted
-    )
-    placed_items = {item.seq for item in setup.mission.items if item.command in PLACES}
-    higher_start: Suggestion = ()
-    if start is not None and int(setup.route.items[start]) in placed_items:
-        higher_start = (Change("height", requirements.waypoint(start), None, _round_to_meter(shortfall), "m"),)
-    both = (*higher_end, *higher_start) if higher_end and higher_start else ()
-    return tuple(suggestion for suggestion in (higher_end, both, higher_start) if suggestion)
 
 
 # Smallest difference of the ground's altitude along a leg for which following the ground is suggested, m.

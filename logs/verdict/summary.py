@@ -414,32 +414,6 @@ def _airframe_or_autopilot_lines(
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
-def _misspelling_lines(parameters: ParameterSet) -> list[str]:
-    """Return a line for each name in the parameter file that looks like a misspelled parameter name.
-
-    A name that differs by a digit, as BATT2_CAPACITY from BATT_CAPACITY, is another parameter.  So is a name in a file
-    that contains the similar name, too.
-    """
-    known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
-
-    def is_meant(name: str, known: str) -> bool:
-        """Return True if `name` misspells the parameter name `known`.
-
-        Return False if only short parts such as P and D differ, or if the file also contains `known`.
-        """
-        differing_parts = set(name.split("_")) ^ set(known.split("_"))
-        is_stated = known_names[known][0].name in stated_names
-        return not is_stated and is_one_edit(name, known) and min(map(len, differing_parts)) > _LONGEST_SHORT_PART
-
-    lines = []
-    for name in parameters.unused:
-        meant_name = next((known for known in known_names if is_meant(name, known)), "")
-        if meant_name and name not in known_names:
-            title = parameters.table.title
-            lines.append(f"Not a parameter of the simulated {title}: {name}: did you mean {meant_name}?")
-    return lines[:_MAX_NAMED_FINDINGS]
-
-
 def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     """Return lines on the sources of the parameters, on names without an effect, and on contradictions.
 
@@ -448,12 +422,28 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
         return []
-    contradictions = [
-        *(_misspelling_lines(parameters) if isinstance(parameters, ParameterSet) else ()),
-        *([f"Contradictory parameters: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []),
-    ]
+    faults = []
+    if isinstance(parameters, ParameterSet):
+        # Names that look like misspelled parameter names.  A name that differs by a digit, as BATT2_CAPACITY from
+        # BATT_CAPACITY, is another parameter.  So is a name in a file that contains the similar name, too.
+        known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
+        absent_names = [name for name in known_names if known_names[name][0].name not in stated_names]
+        for name in parameters.unused:
+            meant_names = (
+                known_name
+                for known_name in absent_names
+                if is_one_edit(name, known_name)
+                # Short parts such as P and D are not misspelled.
+                and min(map(len, set(name.split("_")) ^ set(known_name.split("_")))) > _LONGEST_SHORT_PART
+            )
+            if name not in known_names and (meant_name := next(meant_names, "")):
+                title = parameters.table.title
+                faults.append(f"Not a parameter of the simulated {title}: {name}: did you mean {meant_name}?")
+        faults = faults[:_MAX_NAMED_FINDINGS]
+    if parameters.contradictions:
+        faults.append(f"Contradictory parameters: {'; '.join(parameters.contradictions)}")
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
-        return contradictions
+        return faults
     counts = {origin: len(parameters.by_origin(origin)) for origin in get_args(Origin)}
     assumed_text = f"{counts['assumed']} assumed for the landing, " if counts["assumed"] else ""
     # A name that is too long is a mistake in the file; other unused names belong to other hardware.
@@ -475,7 +465,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     return [
         f"Parameters: {counts['file']} from the file, {assumed_text}{counts['aircraft']} from the aircraft,"
         f" {counts['default']} from {setup.autopilot.title}'s defaults{notes}",
-        *contradictions,
+        *faults,
     ]
 
 

@@ -132,22 +132,25 @@ def change_text(change: Change) -> str:
         case "terrain height":
             return _terrain_height_text((change,))
         case "rise":
-            return _rise_text(change)
+            verb = "climb" if math.copysign(1.0, requested_value) > 0.0 else "descend"
+            if change.current is None:
+                return f"{verb} {abs(requested_value):.0f} m on {place_name}"
+            wanted_text, current_text = _changed_texts(change)
+            return f"{verb} {wanted_text} instead of {current_text} on {place_name}"
         case "airspeed" if change.most is not None:
-            return (
-                f"command an airspeed of {requested_value:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
-            )
+            return f"command an airspeed of {requested_value:.1f} to {change.most:.1f} m/s on {place_name}"
         case "airspeed":
             wanted_text, current_text = _changed_texts(change)
-            return f"{_airspeed_text(change, wanted_text)} instead of {current_text}"
+            where = {"leg": f" {place_name}", "waypoint": f" through {place_name}"}.get(change.place.kind, "")
+            return f"fly{where} at {wanted_text} instead of {current_text}"
         case "turn":
-            return f"turn at most {requested_value:.1f}° at {place_text(change.place)}"
+            return f"turn at most {requested_value:.1f}° at {place_name}"
         case "height" | "descent":
             verb = "raise" if change.what == "height" else "lower"
             if change.place.kind == "leg":
                 return f"{verb} both ends of {place_name} by {requested_value:.0f} m"
             if change.place.kind == "waypoint":
-                return f"{verb} {place_text(change.place)} by {requested_value:.0f} m"
+                return f"{verb} {place_name} by {requested_value:.0f} m"
             return (
                 f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
             )
@@ -228,23 +231,6 @@ def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
     while digits < _MAX_DIGITS and wanted != current and f"{wanted:.{digits}f}" == f"{current:.{digits}f}":
         digits += 1
     return f"{wanted:.{digits}f}{suffix}", f"{current:.{digits}f}{suffix}"
-
-
-def _airspeed_text(change: Change, airspeed_text: str) -> str:
-    """Phrase a change of airspeed as an instruction, such as "fly leg 1 at 20.5 m/s"."""
-    if change.place.kind == "leg":
-        return f"fly {place_text(change.place)} at {airspeed_text}"
-    where = f" through {place_text(change.place)}" if change.place.kind == "waypoint" else ""
-    return f"fly{where} at {airspeed_text}"
-
-
-def _rise_text(change: Change) -> str:
-    """Phrase a change of a leg's climb or descent as an instruction."""
-    verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "descend"
-    if change.current is None:
-        return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
-    wanted_text, current_text = _changed_texts(change)
-    return f"{verb} {wanted_text} instead of {current_text} on {place_text(change.place)}"
 
 
 def _length_text(change: Change) -> str:
@@ -361,21 +347,18 @@ def moves_text(moves: Sequence[ItemMove]) -> str:
             if round(abs(step), 1) > 0.0
         ]
         items_by_offset.setdefault(_join_with_and(steps), []).append(move.item)
-    return ", ".join(f"{_items_text(items)} {offset}" for offset, items in items_by_offset.items())
-
-
-def _items_text(items: Sequence[int]) -> str:
-    """Name items in increasing order, three or more consecutive items as a range."""
-    runs: list[list[int]] = []
-    for item in items:
-        if runs and item == runs[-1][-1] + 1:
-            runs[-1].append(item)
-        else:
-            runs.append([item])
-    names = [
-        name for run in runs for name in ([f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(item) for item in run])
-    ]
-    return f"item{'s' if len(items) > 1 else ''} {_join_with_and(names)}"
+    texts = []
+    for offset, items in items_by_offset.items():
+        # Three or more consecutive items are named as a range.
+        runs: list[list[int]] = []
+        for item in items:
+            if runs and item == runs[-1][-1] + 1:
+                runs[-1].append(item)
+            else:
+                runs.append([item])
+        names = [name for run in runs for name in ([f"{run[0]} to {run[-1]}"] if len(run) > 2 else map(str, run))]
+        texts.append(f"item{'s' if len(items) > 1 else ''} {_join_with_and(names)} {offset}")
+    return ", ".join(texts)
 
 
 def _join_with_and(texts: Sequence[str]) -> str:

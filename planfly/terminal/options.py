@@ -150,8 +150,8 @@ def add_aircraft_and_wind_options(parser: CommandParser) -> None:
         "--airspeed",
         metavar="M/S",
         type=number_parser("airspeed"),
-        help="airspeed in m/s until the mission sets another: equivalent airspeed with ArduPlane and PX4, true airspeed "
-        "with planfly's guidance (default: the aircraft's cruise speed)",
+        help="airspeed in m/s until the mission sets another: equivalent airspeed with ArduPlane and PX4, true "
+        "airspeed with planfly's guidance (default: the aircraft's cruise speed)",
     )
     group.add_argument(
         "--wind",
