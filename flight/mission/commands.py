@@ -260,8 +260,7 @@ SUPPORT: dict[Command, Support] = {
     C.NAV_LOITER_UNLIM: Support(
         _FLOWN,
         _FLOWN,
-        "an unlimited loiter; one minute and at least one lap of it are flown. A height of 0 m keeps the altitude of "
-        "the item before, in all four loiters, as in ArduPlane (`Location::sanitize`); with PX4 it is not judged",
+        "an unlimited loiter, of which one minute and at least one lap are flown",
     ),
     C.NAV_LOITER_TURNS: Support(_FLOWN, _REFUSED, "a loiter for a number of turns"),
     C.NAV_LOITER_TIME: Support(_FLOWN, _FLOWN, "a loiter for a time"),
