@@ -30,6 +30,7 @@ from planfly.workflow.uav import Uav
 from planner.evaluation.certify import least_height
 from planner.evaluation.problem import make_problem
 from planner.search.plan_front import FrontPlan
+from world.compile_events import COMPILE_TIMER
 from world.scenario import Scenario, scenario_from_spec
 
 # Maximum CPU time of a search for one path, for which a user waits, s.  CPU time, so that a busy machine finds the same
@@ -160,11 +161,17 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
-    uav, seed, deadline = request.uav, request.seed, time.process_time() + seconds
+    uav, seed = request.uav, request.seed
+
+    def measure_working_time() -> float:
+        """Return the CPU time of this process without the compilation of kernels, s."""
+        return time.process_time() - COMPILE_TIMER.seconds
+
+    deadline = measure_working_time() + seconds
 
     def stop() -> str:
         """Return the reason to end the search after the deadline, and "" before it."""
-        return "budget" if time.process_time() > deadline else ""
+        return "budget" if measure_working_time() > deadline else ""
 
     # Between two items of a mission, the path must join the leg after the second.
     joins_next_leg = request.ends is not None

@@ -1,5 +1,9 @@
 """Paths to choose from: several of one search, what each is the best in, and the one that is taken."""
 
+import time
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,7 +13,8 @@ from planfly.studio.documents import open_document
 from planfly.studio.jobs import LONG_WORKER, Jobs
 from planfly.studio.session import Session
 from planfly.studio.worker_process import Answer, Task
-from planfly.studio.worker_tasks import plan
+from planfly.studio.worker_tasks import PlanRequest, plan
+from world.compile_events import COMPILE_TIMER
 from world.errors import PlanflyError
 
 
@@ -42,3 +47,28 @@ def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatc
     session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=1))
     assert session.judged.setup.plan is found[1].plan
     assert session.mission_message()["undo"] == "plan with seed 1"
+
+
+@pytest.mark.parametrize(
+    ("waited", "compiled", "computed", "reason"),
+    [(900.0, 0.0, 0.0, ""), (0.0, 90.0, 90.0, ""), (0.0, 0.0, 26.0, "budget")],
+)
+def test_a_search_is_limited_by_its_own_computing_time(
+    waited: float, compiled: float, computed: float, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """25 s: neither time on the clock of a busy machine counts, nor the compilation of kernels at the first start."""
+    asked = []
+
+    def make_plan(*args: Any, stop: Callable[[], str], **kwargs: Any) -> Any:
+        clock, process = time.monotonic(), time.process_time()
+        monkeypatch.setattr(time, "monotonic", lambda: clock + waited)
+        monkeypatch.setattr(time, "process_time", lambda: process + computed)
+        monkeypatch.setattr(COMPILE_TIMER, "seconds", COMPILE_TIMER.seconds + compiled)
+        asked.append(stop())
+        raise InterruptedError
+
+    monkeypatch.setattr("planfly.studio.worker_tasks.make_plan", make_plan)
+    session = Session.from_document(open_document("hard-07", MissionOptions()), MissionOptions())
+    with pytest.raises(InterruptedError):
+        plan(PlanRequest(session.context.scenario, session.context.uav, 1), lambda *_: None)
+    assert asked == [reason]
