@@ -215,36 +215,28 @@ def _make_folder(args: argparse.Namespace) -> int:
             print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
         print("  guessed  README.md lists the guessed values and their possible error")
     if args.params is not None:
-        _print_parameters(args, new_aircraft)
+        # Print the values of the parameter file, those that the data sheet overrides, and those that the model misses.
+        from aircraft.uncertainty import read_uncertainty
+        from flight.dynamics.fdm import Fdm
+        from planfly.workflow import data_sheets
+
+        stated = data_sheets.read_aircraft_parameters(Path(args.params))
+        values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
+        print(f"  params   {args.params}: {values_text}")
+        if overridden := data_sheets.overridden_texts(vars(args), stated):
+            print(f"  params   the data sheet overrides {', '.join(overridden)}")
+        performance = data_sheets.measure_performance(Fdm(new_aircraft, is_tested=True), new_aircraft)
+        uncertainty = read_uncertainty(new_aircraft.folder)
+        climb_shortfall = 0.0 if uncertainty is None else uncertainty.climb_shortfall
+        airspeed = new_aircraft.airspeed
+        for line in data_sheets.missed_value_lines(stated.values, airspeed, performance, climb_shortfall):
+            print(f"  params   {line}")
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
     print(
         f"next      `planfly aircraft {shlex.quote(str(folder_text))}` shows it; `planfly fly MISSION --aircraft"
         f" {shlex.quote(str(folder_text))}` flies it"
     )
     return FLYABLE
-
-
-def _print_parameters(args: argparse.Namespace, aircraft: "Aircraft") -> None:
-    """Print the values of a parameter file, those that the data sheet overrides, and those that the model misses."""
-    from aircraft.uncertainty import read_uncertainty
-    from flight.dynamics.fdm import Fdm
-    from planfly.workflow.data_sheets import (
-        measure_performance,
-        missed_value_lines,
-        overridden_texts,
-        read_aircraft_parameters,
-    )
-
-    stated = read_aircraft_parameters(Path(args.params))
-    values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
-    print(f"  params   {args.params}: {values_text}")
-    if overridden := overridden_texts(vars(args), stated):
-        print(f"  params   the data sheet overrides {', '.join(overridden)}")
-    performance = measure_performance(Fdm(aircraft, is_tested=True), aircraft)
-    uncertainty = read_uncertainty(aircraft.folder)
-    climb_shortfall = 0.0 if uncertainty is None else uncertainty.climb_shortfall
-    for line in missed_value_lines(stated.values, aircraft.airspeed, performance, climb_shortfall):
-        print(f"  params   {line}")
 
 
 def _identify(args: argparse.Namespace) -> int:
@@ -357,7 +349,25 @@ def _print_numbers(numbers: "AircraftNumbers") -> None:
         root = f"{mode.root.real:+.4f}" + (f" +-{mode.root.imag:.4f}j" if mode.root.imag else "")
         kind = "to half" if mode.root.real < 0.0 else "to DOUBLE"
         print(f"  {mode.name:<14} {root:<20} {mode.frequency:7.3f} rad/s{mode.damping:9.2f}{mode.time:9.2f} s {kind}")
-    _print_envelope(aircraft, envelope)
+    # The steepest climb and descent, relative to air and ground, and the speeds of level flight.
+    altitudes = [float(amsl) for amsl in envelope.amsl[::2]]
+    header = "".join(f"{amsl:>13.0f} m" for amsl in altitudes)
+    print("\nsteepest climb / descent relative to the air, deg, by airspeed and altitude AMSL ('-': no steady flight)")
+    print(f"  m/s  {header}")
+    for airspeed in envelope.airspeed.tolist():
+        cells = "".join(f"{_angle_pair_text(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in altitudes)
+        print(f"  {airspeed:5.1f}{cells}")
+    for title, index in (("level, from", 0), ("level, to", 1)):
+        cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in altitudes)
+        print(f"  {title:<5}{cells[len(title) - 5 :]}")
+    print(f"\nsteepest climb / descent relative to the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
+    for title, tailwind, crosswind in (
+        ("calm", 0.0, 0.0),
+        (f"{_WIND_MPS:g} m/s tailwind", _WIND_MPS, 0.0),
+        (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
+        (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
+    ):
+        print(f"  {title:<18}{_angle_pair_text(*envelope.slope_limits(aircraft.airspeed, 500.0, tailwind, crosswind))}")
     speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max, aircraft.airspeed + _WIND_MPS]
     print("\nturn radius, m, by ground speed and bank")
     print("  m/s     " + "".join(f"{bank:>8.0f} deg" for bank in _BANKS_DEG))
@@ -409,28 +419,6 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
             f" flight ± {envelope.fastest_sd:.1f} m/s, power within a factor of {math.exp(envelope.power_sd):.2f}"
             " (one standard deviation)"
         )
-
-
-def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
-    """Print the steepest climb and descent, relative to air and ground, and the speeds of level flight."""
-    altitudes = [float(amsl) for amsl in envelope.amsl[::2]]
-    header = "".join(f"{amsl:>13.0f} m" for amsl in altitudes)
-    print("\nsteepest climb / descent relative to the air, deg, by airspeed and altitude AMSL ('-': no steady flight)")
-    print(f"  m/s  {header}")
-    for airspeed in envelope.airspeed.tolist():
-        cells = "".join(f"{_angle_pair_text(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in altitudes)
-        print(f"  {airspeed:5.1f}{cells}")
-    for title, index in (("level, from", 0), ("level, to", 1)):
-        cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in altitudes)
-        print(f"  {title:<5}{cells[len(title) - 5 :]}")
-    print(f"\nsteepest climb / descent relative to the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
-    for title, tailwind, crosswind in (
-        ("calm", 0.0, 0.0),
-        (f"{_WIND_MPS:g} m/s tailwind", _WIND_MPS, 0.0),
-        (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
-        (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
-    ):
-        print(f"  {title:<18}{_angle_pair_text(*envelope.slope_limits(aircraft.airspeed, 500.0, tailwind, crosswind))}")
 
 
 def _angle_pair_text(climb: float, descent: float) -> str:

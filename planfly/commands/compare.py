@@ -39,12 +39,22 @@ def compare(args: argparse.Namespace) -> int:
     from planfly.api import reporting
     from planfly.campaigns.compare_campaigns import campaign_table
 
-    for path in (Path(args.first), Path(args.second)):
-        if (path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None:
-            return _compare_campaigns(args)
+    paths = (Path(args.first), Path(args.second))
+    if any((path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None for path in paths):
+        from planfly.api import campaigns
+        from planfly.campaigns.compare_campaigns import comparison_lines
+
+        for option, value in (("--out", args.out), ("--svg", args.svg)):
+            if value:
+                message = f"{option}: allowed only with two flight logs, not with campaigns"
+                raise PlanflyError(message, field=option, value=value)
+        campaign_comparison = campaigns.compare_campaigns(args.first, args.second)
+        print("\n".join(comparison_lines(campaign_comparison)))
+        write_json_if_requested(args, lambda: _campaigns_answer(campaign_comparison))
+        return FLYABLE
     from logs.views.report.compare import difference_lines
 
-    logs = [read_log(Path(file)) for file in (args.first, args.second)]
+    logs = [read_log(path) for path in paths]
     comparison = reporting.compare(logs[0], logs[1], args.out, svg=args.svg, overwrite=args.overwrite)
     target_files = [] if args.out is None else [Path(args.out) / name for name in COMPARE_FILES]
     files = [file for file in target_files if file.exists()]
@@ -57,23 +67,6 @@ def compare(args: argparse.Namespace) -> int:
     code = INCOMPLETE if incomplete_logs else FLYABLE
     write_json_if_requested(args, lambda: _json_answer(comparison, files, code))
     return code
-
-
-def _compare_campaigns(args: argparse.Namespace) -> int:
-    """Print the comparison of two campaigns."""
-    from planfly.api import campaigns
-
-    for option, value in (("--out", args.out), ("--svg", args.svg)):
-        if value:
-            raise PlanflyError(
-                f"{option}: allowed only with two flight logs, not with campaigns", field=option, value=value
-            )
-    comparison = campaigns.compare_campaigns(args.first, args.second)
-    from planfly.campaigns.compare_campaigns import comparison_lines
-
-    print("\n".join(comparison_lines(comparison)))
-    write_json_if_requested(args, lambda: _campaigns_answer(comparison))
-    return FLYABLE
 
 
 def _campaigns_answer(comparison: "CampaignComparison") -> object:

@@ -123,7 +123,19 @@ def replay(args: argparse.Namespace) -> int:
         for file in call_api(replaying.movie, args, log=log, out=args.movie)[:3]:
             print(f"movie     {file}")
     elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
-        _show_instruments(log, args)
+        # Show frames until the end or an interruption; the last frame stays on the terminal.
+        speed, lines = args.speed or 1.0, list[str]()
+        frames = call_api(replaying.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
+        screen = plain_stream(sys.stdout)
+        print(_ENTER_SCREEN, end="", file=screen)
+        try:
+            for _, lines in frames:
+                visible_lines = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
+                text = "".join(escape_controls(line) + _ERASE_LINE_END + "\n" for line in visible_lines)
+                print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True, file=screen)
+        finally:
+            print(_LEAVE_SCREEN, end="", flush=True, file=screen)
+        print("\n".join(lines))
     else:
         # The timeline is printed at `--speed` times real time, or at once without it.
         entries = call_api(replaying.timeline, args, log=log)
@@ -147,21 +159,3 @@ def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> objec
     entries = replaying.timeline(log) if isinstance(args.to, str) else call_api(replaying.timeline, args, log=log)
     events = [TimelineEvent(time_s=entry.time, kind=entry.kind, text=entry.text) for entry in entries]
     return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)
-
-
-def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
-    """Show frames until the end or an interruption; the last frame stays on the terminal."""
-    from planfly.api import replaying
-
-    speed, lines = args.speed or 1.0, list[str]()
-    frames = call_api(replaying.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
-    screen = plain_stream(sys.stdout)
-    print(_ENTER_SCREEN, end="", file=screen)
-    try:
-        for _, lines in frames:
-            visible_lines = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
-            text = "".join(escape_controls(line) + _ERASE_LINE_END + "\n" for line in visible_lines)
-            print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True, file=screen)
-    finally:
-        print(_LEAVE_SCREEN, end="", flush=True, file=screen)
-    print("\n".join(lines))

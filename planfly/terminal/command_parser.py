@@ -102,6 +102,8 @@ def colour_help(text: str) -> str:
     return text
 
 
+# Comma-separated numbers that start with a negative number, which argparse would take for an option.
+_NEGATIVE_NUMBERS = re.compile(r"-\.?\d[^=]*")
 # Long option as one word.
 _LONG_OPTION = re.compile(r"--[a-z][a-z-]*")
 
@@ -239,7 +241,13 @@ class LineParser(CommandParser):
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
         """Parse the command line. For bad usage, print one line with a suggestion and raise SystemExit."""
-        arguments = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
+        arguments: list[str] = []
+        for argument in sys.argv[1:] if args is None else args:
+            # A negative number is joined to the option before it, as in --from=-33.9,18.4.
+            if _NEGATIVE_NUMBERS.fullmatch(argument) and arguments and _LONG_OPTION.fullmatch(arguments[-1]):
+                arguments[-1] += f"={argument}"
+            else:
+                arguments.append(argument)
         if arguments and not arguments[0].startswith("-") and arguments[0] not in self.commands:
             hint = did_you_mean(arguments[0], self.commands) or f"; the commands are {', '.join(self.commands)}"
             self.error(f"{arguments[0]!r}: unknown command{hint}")
@@ -262,21 +270,6 @@ class LineParser(CommandParser):
             is_file = Path(word).exists()
             parser.error(f"{word}: {'the command takes one file at a time' if is_file else 'no such argument'}")
         return parsed
-
-
-# Comma-separated numbers that start with a negative number, which argparse would take for an option.
-_NEGATIVE_NUMBERS = re.compile(r"-\.?\d[^=]*")
-
-
-def _join_negative_numbers(arguments: list[str]) -> list[str]:
-    """Join each negative number of a command line to the option before it, as in --from=-33.9,18.4."""
-    joined_arguments: list[str] = []
-    for argument in arguments:
-        if _NEGATIVE_NUMBERS.fullmatch(argument) and joined_arguments and _LONG_OPTION.fullmatch(joined_arguments[-1]):
-            joined_arguments[-1] += f"={argument}"
-        else:
-            joined_arguments.append(argument)
-    return joined_arguments
 
 
 # ----------------------------------------------------------------------

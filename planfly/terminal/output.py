@@ -365,33 +365,24 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
     """
     time_left = _TimeLeft(kind or title)
     display = _Bar(title, time_left) if sys.stderr.isatty() else _Lines(title, time_left)
-    with display, _refresh_regularly(display):
-        yield display.advance
-    time_left.store_duration()
-
-
-@contextmanager
-def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
-    """Refresh a display every second from a thread while the block runs.
-
-    If no thread can start, the display is not refreshed.
-    """
     stage_ended = threading.Event()
 
     def refresh() -> None:
-        """Refresh the display at intervals until the stage ends."""
+        """Refresh the display every second until the stage ends."""
         # The reader of the stream may have gone; the work itself handles this error.
         with contextlib.suppress(OSError, ValueError):
             while not stage_ended.wait(_REFRESH_INTERVAL_S):
                 display.refresh()
 
-    thread = threading.Thread(target=refresh, name="progress", daemon=True)
-    with contextlib.suppress(RuntimeError):
-        thread.start()
-    try:
-        yield
-    finally:
-        stage_ended.set()
+    with display:
+        # If no thread can start, the display is not refreshed.
+        with contextlib.suppress(RuntimeError):
+            threading.Thread(target=refresh, name="progress", daemon=True).start()
+        try:
+            yield display.advance
+        finally:
+            stage_ended.set()
+    time_left.store_duration()
 
 
 def _join_nonempty(*parts: str) -> str:
@@ -686,17 +677,15 @@ def _check_named_once(name: str, target: Path, args: argparse.Namespace) -> None
         if key in (name, "command"):
             continue
         for other_name in value if isinstance(value, list) else [value]:
-            if (
-                isinstance(other_name, str)
-                and other_name != STANDARD_OUTPUT
-                and _is_same_path(target, Path(other_name))
-            ):
+            if not isinstance(other_name, str) or other_name == STANDARD_OUTPUT:
+                continue
+            other_path = Path(other_name)
+            is_same_file = False
+            # The files need not exist, and other texts need not be paths.
+            with contextlib.suppress(OSError, ValueError, RuntimeError):
+                is_same_file = target.resolve() == other_path.resolve() or (
+                    target.exists() and target.samefile(other_path)
+                )
+            if is_same_file:
                 reason = f"is already named by another argument; name another file for --{name}"
                 raise PlanflyError(f"{target}: {reason}", file=target, field=f"--{name}")
-
-
-def _is_same_path(first: Path, second: Path) -> bool:
-    """Return True if two paths name the same file, which need not exist."""
-    with contextlib.suppress(OSError, ValueError, RuntimeError):
-        return first.resolve() == second.resolve() or (first.exists() and first.samefile(second))
-    return False

@@ -42,7 +42,19 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
 
     Yields a list to which the number of a signal is added when it arrives.
     """
-    read_number, write_handle = _signal_pipe()
+    # A function that reads signal numbers, and a handle to which Python writes them without blocking.
+    read_number: Callable[[int], bytes]
+    if hasattr(os, "set_blocking"):
+        read_handle, write_handle = os.pipe()
+        os.set_blocking(write_handle, False)
+        read_number = functools.partial(os.read, read_handle)
+    else:
+        # On Windows before Python 3.12 pipes always block, but sockets need not block.
+        import socket
+
+        receiver, sender = socket.socketpair()
+        sender.setblocking(False)
+        read_number, write_handle = receiver.recv, sender.detach()
     received: list[int] = []
     is_ending = False
 
@@ -97,23 +109,6 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
-
-
-def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """Return a function that reads signal numbers, and the handle to which Python writes them.
-
-    Writing to the handle does not block.
-    """
-    if hasattr(os, "set_blocking"):
-        read, write = os.pipe()
-        os.set_blocking(write, False)
-        return functools.partial(os.read, read), write
-    # On Windows before Python 3.12 pipes always block, but sockets need not block.
-    import socket
-
-    receiver, sender = socket.socketpair()
-    sender.setblocking(False)
-    return receiver.recv, sender.detach()
 
 
 def _end_process_after_signal(read_number: Callable[[int], bytes], received: list[int], grace: float) -> None:
