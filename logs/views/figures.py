@@ -158,7 +158,7 @@ FIGURES = (
         caption=lambda subject: subject.text_if_flown(
             "The broad line is the plan, and the thin line on it is the flight."
             + (
-                " At corners the two differ: the aircraft flies an arc inside the waypoint."
+                " At corners the two differ: the aircraft flies an arc."
                 if subject.setup.imported_log is None
                 else ""
             ),

@@ -75,7 +75,7 @@ def verdict_lines(
     if returns is not None and returns.line:
         is_warning = verdict.flyable and returns.has_failures
         requirement = "; the scenario requires no safe return" if is_warning else ""
-        text = f"returns   {returns.line}{requirement}; details: planfly returns"
+        text = f"returns   {returns.line}{requirement}; planfly returns tries every second of the flight"
         lines.insert(1 if is_warning else len(lines), colour_text(text, "warning") if is_warning else text)
     return lines
 
