@@ -140,7 +140,11 @@ def fly_for_excursions(
     times, positions, velocities = _sampled_flight(flown_mission.track)
     paths = _return_paths(setup, flown_mission.track, interval, glide=glide)
     uav = varied.uav.aircraft
-    sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
+    sampled = [(positions, velocities)]
+    for path_of_return in paths.returns:
+        # Positions and ground velocities of every `_RETURN_SAMPLE_ROWS`-th row and of the last row.
+        rows = np.union1d(np.arange(0, len(path_of_return), _RETURN_SAMPLE_ROWS), [len(path_of_return) - 1])
+        sampled.append((path_of_return[rows], np.gradient(path_of_return, axis=0)[rows]))
     half_span = 0.5 * uav.wing_span
     lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
     turns = turn_areas(times, positions, paths.times, paths.turns, interval)
@@ -183,17 +187,6 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
     is_kept[-1] = True
     sampled_rows = rows[is_kept]
     return track.time[sampled_rows], track.position[sampled_rows], track.velocity[sampled_rows].astype(np.float64)
-
-
-def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
-    """Return sampled positions of a return, m, and ground velocities, m/s, (n, 3) each.
-
-    Samples are every `_RETURN_SAMPLE_ROWS`-th position and the last position.
-
-    path: positions of the return, one each second, m, (t, 3).
-    """
-    rows = np.union1d(np.arange(0, len(path), _RETURN_SAMPLE_ROWS), [len(path) - 1])
-    return path[rows], np.gradient(path, axis=0)[rows]
 
 
 class _ReturnPaths(NamedTuple):

@@ -68,13 +68,29 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
     command: command line that repeats the campaign.
     """
-    pictures = [draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
-    lines = campaign_lines(summary)
     failure_rows = [
         (RULE_WORDS[failures.rule].title, place_text(place), count)
         for failures in summary.by_rule
         for place, count in failures.places
     ]
+    # The figures, each with its caption.
+    outcomes = np.array(list(store.outcomes().values()))
+    speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
+    is_decided = outcomes != "undecided"
+    bins = group_by_speed(speed[is_decided], (outcomes == "flyable")[is_decided], summary.goal.confidence)
+    tally = summary.estimate.tally
+    caption = "Share of flyable flights against mean wind speed"
+    if tally.undecided:
+        caption += f", without the {tally.undecided} that are not judged in full"
+    figures = [(draw_probability(bins, summary.goal.target), caption)] if bins else []
+    for deciding in summary.deciding:
+        if deciding.drivers:
+            bars = [Bar(entry.title, entry.index, entry.slope) for entry in deciding.drivers]
+            tornado = draw_tornado(bars, RULE_WORDS[deciding.rule].title)
+            figures.append((tornado, "What the smallest margin depends on"))
+    if failure_rows:
+        figures.append((draw_failures(failure_rows, tally.flown), "Number of flights that failed each rule, by place"))
+    figures += _draw_tracks(base, store)
     worst_rows = []
     for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True):
         failures_text = "; ".join(
@@ -96,44 +112,18 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         name=summary.name,
         heading="how likely is a flight to succeed",
         answer=summary.estimate.answer,
-        lines=lines,
+        lines=campaign_lines(summary),
         failures=failure_rows,
-        flights=summary.estimate.tally.flown,
+        flights=tally.flown,
         worst=worst_rows,
         drawn=summary.dispersions.get("aircraft"),
         dispersions=dispersion_rows,
-        pictures=pictures,
+        pictures=[draw_both_widths(figure, caption) for figure, caption in figures],
         command=command,
         made_of=summary.made_of,
         seed=summary.seed,
     )
     return text.encode("utf-8")
-
-
-def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the figures of a campaign's report; return each with its caption."""
-    outcomes = np.array(list(store.outcomes().values()))
-    speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
-    is_decided = outcomes != "undecided"
-    bins = group_by_speed(speed[is_decided], (outcomes == "flyable")[is_decided], summary.goal.confidence)
-    counts = [
-        (RULE_WORDS[entry.rule].title, place_text(place), count)
-        for entry in summary.by_rule
-        for place, count in entry.places
-    ]
-    caption = "Share of flyable flights against mean wind speed"
-    if summary.estimate.tally.undecided:
-        caption += f", without the {summary.estimate.tally.undecided} that are not judged in full"
-    figures = [(draw_probability(bins, summary.goal.target), caption)] if bins else []
-    for deciding in summary.deciding:
-        if deciding.drivers:
-            bars = [Bar(entry.title, entry.index, entry.slope) for entry in deciding.drivers]
-            tornado = draw_tornado(bars, RULE_WORDS[deciding.rule].title)
-            figures.append((tornado, "What the smallest margin depends on"))
-    if counts:
-        failures = draw_failures(counts, summary.estimate.tally.flown)
-        figures.append((failures, "Number of flights that failed each rule, by place"))
-    return figures + _draw_tracks(base, store)
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
@@ -500,26 +490,6 @@ def _deciding_rules(winds: WindsResult) -> list[str]:
     return [deciding_rule(by_rule) for by_rule in winds.failures] or [""] * len(winds.boundaries)
 
 
-def _lines_without_failures(winds: WindsResult) -> list[str]:
-    """Return a line about the directions in which no flight failed; [] if there are none.
-
-    The line states the probability of success that is proven by the flights in the maximum wind of these directions.
-    """
-    max_speed, confidence = winds.goal.most, winds.goal.confidence
-    counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
-    failed_directions = {direction for direction, _, flyable in winds.flights if not flyable}
-    counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed_directions and counts_at_max[k]]
-    if not counts:
-        return []
-    min_count = min(counts)
-    probability_text = f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
-    return [
-        f"in {len(counts)} of {count_text(len(winds.boundaries), 'direction')} no flight failed: at least"
-        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show a probability of at"
-        f" least {probability_text}"
-    ]
-
-
 def _flown_bound_lines(winds: WindsResult) -> list[str]:
     """Return lines on the flown winds of the directions whose boundary is not stated.
 
@@ -629,13 +599,26 @@ def wind_lines(winds: WindsResult) -> list[str]:
             f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died, and"
             f" count as not flyable: {flight_texts}"
         ]
+    # The probability of success that the flights in the maximum wind prove for directions in which no flight failed.
+    lines_without_failures = []
+    max_speed = winds.goal.most
+    counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
+    failed_directions = {direction for direction, _, flyable in winds.flights if not flyable}
+    counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed_directions and counts_at_max[k]]
+    if counts:
+        probability_text = f"{lower_bound(Tally(min(counts), 0), winds.goal.confidence):.3g}"
+        lines_without_failures = [
+            f"in {len(counts)} of {count_text(len(winds.boundaries), 'direction')} no flight failed: at least"
+            f" {count_text(min(counts), 'flight')} in {max_speed:g} m/s from each of them show a probability of at"
+            f" least {probability_text}"
+        ]
     return [
         *answer_lines,
         *calm_lines,
         *_flown_bound_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *deciding_lines,
-        *_lines_without_failures(winds),
+        *lines_without_failures,
         *lost_lines,
         flights_text,
     ]
