@@ -10,7 +10,7 @@ path: the largest width that is needed anywhere.
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -449,7 +449,17 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
         # A bad raster is refused before the flights.
         least_area = path.buffer(min_geography_half_width(aircraft.wing_span))
         read_population(goal.population, goal.unit, scenario.origin, least_area)
-    rows = _fly_excursions(base, goal, path, workers, advance)
+    # Rows of the flights, by draw.  A flight without areas, or whose worker died, has no row.
+    rows: dict[int, ExcursionRow] = {}
+    requests = map(FlightRequest, range(goal.flights))
+    fly = partial(fly_for_excursions, path=path, interval=goal.interval, glide=goal.glide)
+    with worker_pool(workers, base, fly) as pool:
+        for count, finished in enumerate(pool.fly(partial(next, requests, None)), 1):
+            advance(count, goal.flights, f"{count} of {goal.flights} flights")
+            if isinstance(finished.row, ExcursionRow) and finished.row.flown:
+                rows[finished.request.index] = finished.row
+    if not rows:
+        raise FlightError(f"{base.name}: no flight could be flown", file=base.name)
     # Best glide ratio in calm air: the horizontal distance divided by the lost height.
     glide_ratio = None
     if goal.glide:
@@ -466,7 +476,8 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
             1.0 / float(glide_slopes(model, float(airspeed), altitude, altitude + 1.0).table.min())
             for airspeed in airspeeds
         )
-    return with_ground_class(make_volumes(base, goal, path, rows, glide_ratio))
+    ordered_rows = tuple(rows[index] for index in sorted(rows))
+    return with_ground_class(make_volumes(base, goal, path, ordered_rows, glide_ratio))
 
 
 def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
@@ -501,35 +512,6 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
         raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
     _, positions, _ = _sampled_flight(track)
     return shapely.MultiLineString([positions[:, :2], setup.route.positions[:, :2]]).simplify(0.1)
-
-
-def _fly_excursions(
-    base: CampaignBase, goal: GroundRiskGoal, path: BaseGeometry, workers: Workers, advance: Advance
-) -> tuple[ExcursionRow, ...]:
-    """Fly the flights of a campaign, and return rows with their areas, in the order of the draws.
-
-    A flight without such areas, or whose worker died, has no row.
-
-    path: planned path, and path of the flight without variations, m.
-    Raises FlightError if no flight could be flown.
-    """
-    indices: Iterator[int] = iter(range(goal.flights))
-
-    def next_request() -> FlightRequest | None:
-        """Return the request of the next flight; None if all flights are requested."""
-        index = next(indices, None)
-        return None if index is None else FlightRequest(index)
-
-    fly = partial(fly_for_excursions, path=path, interval=goal.interval, glide=goal.glide)
-    rows: dict[int, ExcursionRow] = {}
-    with worker_pool(workers, base, fly) as pool:
-        for count, finished in enumerate(pool.fly(next_request), 1):
-            advance(count, goal.flights, f"{count} of {goal.flights} flights")
-            if isinstance(finished.row, ExcursionRow) and finished.row.flown:
-                rows[finished.request.index] = finished.row
-    if not rows:
-        raise FlightError(f"{base.name}: no flight could be flown", file=base.name)
-    return tuple(rows[index] for index in sorted(rows))
 
 
 def make_volumes(

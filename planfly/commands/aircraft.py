@@ -173,6 +173,7 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 def _make_folder(args: argparse.Namespace) -> int:
     """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
+    from aircraft.uncertainty import read_uncertainty
     from planfly.api import aircraft as aircraft_api
 
     if args.name is not None:
@@ -191,11 +192,31 @@ def _make_folder(args: argparse.Namespace) -> int:
     has_sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
     origin_text = "from a data sheet" if has_sheet else f"as {Path(args.source or 'aerosonde').name}"
     print(f"aircraft  {folder_text}/ ({', '.join(files)}), {origin_text}")
+    uncertainty = read_uncertainty(new_aircraft.folder) if has_sheet else None
     if has_sheet:
-        _print_data_sheet_performance(new_aircraft)
+        # Print the performance of the data sheet's model, and its uncertainty.
+        from flight.dynamics.envelope_tables import load_envelope
+
+        envelope = load_envelope(new_aircraft)
+        climb, descent = (math.degrees(angle) for angle in envelope.air_angles(new_aircraft.airspeed, 500.0))
+        print(
+            f"  speed    cruise {new_aircraft.airspeed:g} m/s, stall {new_aircraft.stall_speed:g}, fastest level flight"
+            f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {new_aircraft.airspeed_max:g} m/s"
+        )
+        if uncertainty is not None:
+            climb_sd = math.degrees(uncertainty.climb_sd)
+            descent_sd = math.degrees(uncertainty.descent_sd)
+            print(
+                f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
+                f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
+            )
+            power = envelope.power(new_aircraft.airspeed, 500.0, 0.0)
+            lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power_sd) for sign in (-1.0, 1.0))
+            source = "from the battery" if new_aircraft.battery_voltage else "of fuel heat"
+            print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
+        print("  guessed  README.md lists the guessed values and their possible error")
     if args.params is not None:
         # Print the values of the parameter file, those that the data sheet overrides, and those that the model misses.
-        from aircraft.uncertainty import read_uncertainty
         from flight.dynamics.fdm import Fdm
         from planfly.workflow import data_sheets
 
@@ -205,7 +226,6 @@ def _make_folder(args: argparse.Namespace) -> int:
         if overridden := data_sheets.overridden_texts(vars(args), stated):
             print(f"  params   the data sheet overrides {', '.join(overridden)}")
         performance = data_sheets.measure_performance(Fdm(new_aircraft, is_tested=True), new_aircraft)
-        uncertainty = read_uncertainty(new_aircraft.folder)
         climb_shortfall = 0.0 if uncertainty is None else uncertainty.climb_shortfall
         airspeed = new_aircraft.airspeed
         for line in data_sheets.missed_value_lines(stated.values, airspeed, performance, climb_shortfall):
@@ -301,32 +321,6 @@ def _print_uncertain_properties(result: "IdentifiedAircraft") -> None:
             f"  current  not used, because {log_name} has no current (BAT); identify from the other logs alone to use"
             " their current"
         )
-
-
-def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
-    """Print the performance of a data sheet's model, and its uncertainty."""
-    from aircraft.uncertainty import read_uncertainty
-    from flight.dynamics.envelope_tables import load_envelope
-
-    envelope = load_envelope(aircraft)
-    climb, descent = (math.degrees(angle) for angle in envelope.air_angles(aircraft.airspeed, 500.0))
-    uncertainty = read_uncertainty(aircraft.folder)
-    print(
-        f"  speed    cruise {aircraft.airspeed:g} m/s, stall {aircraft.stall_speed:g}, fastest level flight"
-        f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {aircraft.airspeed_max:g} m/s"
-    )
-    if uncertainty is not None:
-        climb_sd = math.degrees(uncertainty.climb_sd)
-        descent_sd = math.degrees(uncertainty.descent_sd)
-        print(
-            f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
-            f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
-        )
-        power = envelope.power(aircraft.airspeed, 500.0, 0.0)
-        lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power_sd) for sign in (-1.0, 1.0))
-        source = "from the battery" if aircraft.battery_voltage else "of fuel heat"
-        print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
-    print("  guessed  README.md lists the guessed values and their possible error")
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:
