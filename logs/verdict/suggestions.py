@@ -197,7 +197,19 @@ def suggest_gentler_slope(
         limit = min(limit, max(float(certain_limits[leg]), LEVEL_SLOPE_RAD))
     max_slope = limit - SUGGESTION_ANGLE_MARGIN_RAD
     if max_slope <= 0.0 or planned_slope <= max_slope:
-        return _gentler_arc(requirements, leg)
+        # The fault may be a fly-by arc that is too steep at the leg's end: suggest gentler legs around it.
+        arc = steep_arc(requirements, leg)
+        if arc is None:
+            return ()
+        slope_ratio = math.tan(math.atan(arc.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(arc.tangent)
+        changes = []
+        for k in (leg, leg + 1):
+            rise = slope_ratio * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
+            # A leg of the opposite slope makes the arc flatter, so it is not changed.
+            if rise * arc.tangent > 0.0:
+                wanted_rise = math.copysign(math.floor(abs(rise)), rise)
+                changes.append(Change("rise", requirements.leg(k), current=None, wanted=wanted_rise, unit="m"))
+        return (tuple(changes),) if changes else ()
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     gentler_height_change = leg_length * math.tan(max_slope)
     longer_length = height_change / math.tan(max_slope)
@@ -253,25 +265,6 @@ def suggest_gentler_landing(
         *_smallest_first(alternatives),
         *_suggest_landing_against_wind(requirements, finding.place, course, ground),
     )
-
-
-def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs around a fly-by arc that is too steep at a leg's end.
-
-    Return () if no arc at the leg is too steep, or if neither leg climbs or descends like the arc.
-    """
-    arc = steep_arc(requirements, leg)
-    if arc is None:
-        return ()
-    slope_ratio = math.tan(math.atan(arc.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(arc.tangent)
-    changes = []
-    for k in (leg, leg + 1):
-        height_change = slope_ratio * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
-        # A leg of the opposite slope makes the arc flatter, so it is not changed.
-        if height_change * arc.tangent > 0.0:
-            requested_height_change = math.copysign(math.floor(abs(height_change)), height_change)
-            changes.append(Change("rise", requirements.leg(k), current=None, wanted=requested_height_change, unit="m"))
-    return (tuple(changes),) if changes else ()
 
 
 def suggest_gentler_turn(

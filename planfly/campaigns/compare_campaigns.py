@@ -1,12 +1,10 @@
 """Compare two campaigns: their probabilities, the difference, the rules that fail more often, and their inputs."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.campaign_inputs import difference_texts
@@ -112,8 +110,24 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
         pairs = [np.empty(0, dtype=np.intp)] * 2
     flyable = np.column_stack([table["outcome"][rows] == "flyable" for table, rows in zip(tables, pairs, strict=True)])
     compared_rows = pairs if len(flyable) else [np.arange(len(table["flight"])) for table in tables]
-    sources = zip((first, second), tables, compared_rows, settings, strict=True)
-    campaigns = [_count_outcomes(*source) for source in sources]
+    # Count each campaign's flights by outcome, and its compared flights by failed rule.
+    campaigns = []
+    for path, table, rows, setting in zip((first, second), tables, compared_rows, settings, strict=True):
+        tally = Tally(*map(table["outcome"].tolist().count, OUTCOMES))
+        goal = Goal(
+            **{field.name: setting[field.name] for field in fields(Goal) if field.name in setting}
+            | {"confidence": DEFAULT_CONFIDENCE}
+        )
+        failed_rules = [
+            {rule for rule, _ in parse_failed_findings(text)}
+            for text, outcome in zip(table["failed"][rows], table["outcome"][rows], strict=True)
+            if outcome != "undecided"
+        ]
+        failed_by_rule = {
+            name: count for name in RULE_WORDS if (count := sum(name in failed for failed in failed_rules))
+        }
+        interval = Estimator(goal).estimate(tally).interval
+        campaigns.append(ComparedCampaign(str(path.parent), tally, interval, failed_by_rule))
     only_first = int(np.count_nonzero(flyable[:, 0] & ~flyable[:, 1]))
     only_second = int(np.count_nonzero(flyable[:, 1] & ~flyable[:, 0]))
     counts = [(campaign.tally.flyable, campaign.tally.flown) for campaign in campaigns]
@@ -147,31 +161,6 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
         tuple(difference_texts(*inputs)),
         (*notes, *_disagreement_notes(difference, is_paired=bool(len(flyable)))),
     )
-
-
-def _count_outcomes(
-    path: Path, table: Mapping[str, NDArray[Any]], compared_rows: NDArray[np.intp], settings: Mapping[str, Any]
-) -> ComparedCampaign:
-    """Count a campaign's flights by outcome, and its compared flights by failed rule.
-
-    path: file of the campaign's table.
-    compared_rows: rows of the compared flights in the table, (n,).
-    table: columns of the campaign's table, by name.
-    settings: stored settings of the campaign, with its goal.
-    """
-    outcomes = table["outcome"].tolist()
-    tally = Tally(*map(outcomes.count, OUTCOMES))
-    goal = Goal(
-        **{field.name: settings[field.name] for field in fields(Goal) if field.name in settings}
-        | {"confidence": DEFAULT_CONFIDENCE}
-    )
-    failed_rules = [
-        {rule for rule, _ in parse_failed_findings(text)}
-        for text, outcome in zip(table["failed"][compared_rows], table["outcome"][compared_rows], strict=True)
-        if outcome != "undecided"
-    ]
-    failed_by_rule = {name: count for name in RULE_WORDS if (count := sum(name in rules for rules in failed_rules))}
-    return ComparedCampaign(str(path.parent), tally, Estimator(goal).estimate(tally).interval, failed_by_rule)
 
 
 def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:

@@ -309,9 +309,15 @@ def find_winds(
                     if calm_rows:
                         progress.report_calm(len(calm_rows))
                         return search.result_in_calm_air(calm_rows)
-                _fly_round(pool, search, missing_requests, stored_flights, progress)
-            for request in requests:
-                search.add_result(request, stored_flights.flown[request.number])
+                # Fly the missing flights of the round, and write each to the table as soon as it is done.
+                flight_requests = [search.make_request(requested) for requested in missing_requests]
+                requested_by_request = dict(zip(flight_requests, missing_requests, strict=True))
+                unsent_requests = iter(flight_requests)
+                for request, row in pool.fly(partial(next, unsent_requests, None)):
+                    stored_flights.add(requested_by_request[request], row)
+                    progress.report(len(stored_flights.flown))
+            for requested in requests:
+                search.add_result(requested, stored_flights.flown[requested.number])
     progress.report(len(search.flown), force=True)
     return search.result()
 
@@ -521,31 +527,6 @@ class _StoredFlights:
         """Write a flight to the table."""
         self._store.add(request, row)
         self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.marginal_passes, row.undecided_text)
-
-
-def _fly_round(
-    pool: WorkerPool,
-    search: _Search,
-    missing_requests: list[RequestedFlight],
-    stored_flights: _StoredFlights,
-    progress: "_ProgressReport",
-) -> None:
-    """Fly the flights of a round that are not in the table, and write each to the table as soon as it is done."""
-    remaining_requests = iter(missing_requests)
-    requested_by_request: dict[FlightRequest, RequestedFlight] = {}
-
-    def next_flight_request() -> FlightRequest | None:
-        """Return the request of the next missing flight of the round; None if all are requested."""
-        requested_flight = next(remaining_requests, None)
-        if requested_flight is None:
-            return None
-        request = search.make_request(requested_flight)
-        requested_by_request[request] = requested_flight
-        return request
-
-    for request, row in pool.fly(next_flight_request):
-        stored_flights.add(requested_by_request[request], row)
-        progress.report(len(stored_flights.flown))
 
 
 class _ProgressReport:

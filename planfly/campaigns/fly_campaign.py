@@ -9,7 +9,7 @@ from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import OUTCOMES, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, Store, StoreError, read_stored_settings
-from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
+from planfly.campaigns.worker_pool import FlightRate, Workers, worker_pool
 from world.wording import count_text
 
 Advance = Callable[[float, float, str], None]
@@ -126,21 +126,16 @@ def fly_campaign(
     if not flight_tally.is_decided and flight_tally.tally.flown < goal.flights:
         progress = _ProgressReport(goal, estimator, flight_tally.tally, advance)
         with worker_pool(workers, base, fly) as pool:
-            _fly_remaining(pool, flight_tally, store, progress)
+            progress.start_timing(flight_tally.tally)
+            for _, row in pool.fly(flight_tally.next_request):
+                store.add(row)
+                flight_tally.add(row.draw.index, row.outcome)
+                progress.report(flight_tally.tally)
+                if flight_tally.is_decided:
+                    break
+            progress.report(flight_tally.tally, force=True)
     store.delete_later_flights(flight_tally.tally.flown)
     return estimator.estimate(store.tally())
-
-
-def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, progress: "_ProgressReport") -> None:
-    """Fly the missing flights until the goal is decided, and write each to the table."""
-    progress.start_timing(flight_tally.tally)
-    for _, row in pool.fly(flight_tally.next_request):
-        store.add(row)
-        flight_tally.add(row.draw.index, row.outcome)
-        progress.report(flight_tally.tally)
-        if flight_tally.is_decided:
-            break
-    progress.report(flight_tally.tally, force=True)
 
 
 class _ProgressReport:

@@ -99,8 +99,19 @@ def examine_table(
             return _check_rows(connection.execute(f"{query} ORDER BY flight"))
     except sqlite3.Error as error:
         _raise_if_locked(error)
-    rows = (row for number in range(max_number) if (row := _read_row(connection, query, number)) is not None)
-    undamaged, damaged = _check_rows(rows)[:2]
+    # Read the flights one by one; a flight that cannot be read is damaged.
+    undamaged: list[int] = []
+    damaged: list[int] = []
+    for number in range(max_number):
+        try:
+            rows = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchmany(1)
+        except sqlite3.Error as error:
+            _raise_if_locked(error)
+            damaged.append(number)
+        else:
+            examination = _check_rows(rows)
+            undamaged += examination.undamaged
+            damaged += examination.damaged
     # In a broken file, a missing row may have been lost with its page.  A number without a valid checksum is accepted
     # if it is in the range of requested flights, which are numbered from 0.
     readable_numbers: list[Any] = []
@@ -129,16 +140,6 @@ def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
     for *values, stored_checksum in rows:
         (examination.undamaged if stored_checksum == checksum(values) else examination.damaged).append(values[0])
     return examination
-
-
-def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
-    """Return the row of a flight number; (number, None) if it cannot be read, None if it does not exist."""
-    try:
-        row: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
-    except sqlite3.Error as error:
-        _raise_if_locked(error)
-        return number, None
-    return row
 
 
 def _raise_if_locked(error: sqlite3.Error) -> None:

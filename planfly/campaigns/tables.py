@@ -186,7 +186,24 @@ class LockedTable:
         tables = {name for (name,) in self._connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if tables:
             stored_settings = _read_settings(self._connection) if "campaign" in tables else {}
-            self._check_same_campaign(stored_settings, settings)
+            schema = stored_settings.get("schema")
+            if schema is None:
+                _check_settings_intact(stored_settings, self.path)
+            if schema != self._kind.schema:
+                raise StoreError(f"{self.path}: schema {schema!r}: expected {self._kind.schema}", file=self.path)
+            _check_settings_intact(stored_settings, self.path)
+            stored_request = json.loads(stored_settings["settings"])
+            if stored_settings.get("made_of") != self.made_of:
+                inputs = [json.loads(json.dumps(request.get("inputs", {}))) for request in (stored_request, settings)]
+                differences = describe_differences(*inputs) or "planfly's code differs"
+                raise StoreError(f"{self.path}: contains a campaign with other settings: {differences}", file=self.path)
+            for name in self._kind.fixed:
+                if stored_request[name] != settings[name]:
+                    raise StoreError(
+                        f"{self.path}: {name} {settings[name]}: the campaign in this file has"
+                        f" {stored_request[name]}; resume it with the same value, or name another folder",
+                        file=self.path,
+                    )
             self._repair_file(stored_settings)
         # Use the connection only from here, because a repair opens another one.
         execute = self._connection.execute
@@ -222,29 +239,6 @@ class LockedTable:
             f"CREATE TABLE IF NOT EXISTS flights ({columns}, checksum TEXT NOT NULL)",
             "CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
         ]
-
-    def _check_same_campaign(self, stored_settings: dict[str, str], settings: dict[str, Any]) -> None:
-        """Raise StoreError if the stored settings are damaged, or belong to another campaign or request."""
-        schema = self._kind.schema
-        if "schema" not in stored_settings:
-            _check_settings_intact(stored_settings, self.path)
-        if stored_settings.get("schema") != schema:
-            raise StoreError(
-                f"{self.path}: schema {stored_settings.get('schema')!r}: expected {schema}", file=self.path
-            )
-        _check_settings_intact(stored_settings, self.path)
-        stored_request = json.loads(stored_settings["settings"])
-        if stored_settings.get("made_of") != self.made_of:
-            inputs = [json.loads(json.dumps(request.get("inputs", {}))) for request in (stored_request, settings)]
-            differences = describe_differences(*inputs) or "planfly's code differs"
-            raise StoreError(f"{self.path}: contains a campaign with other settings: {differences}", file=self.path)
-        for name in self._kind.fixed:
-            if stored_request[name] != settings[name]:
-                raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the campaign in this file has"
-                    f" {stored_request[name]}; resume it with the same value, or name another folder",
-                    file=self.path,
-                )
 
     def _repair_file(self, stored_settings: dict[str, str]) -> None:
         """Rewrite a damaged file with its undamaged flights, and report the damaged flights.

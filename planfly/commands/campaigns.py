@@ -181,11 +181,26 @@ def campaign(args: argparse.Namespace) -> int:
     The code follows from the answer on the target; it is also INCOMPLETE if there is no target and a flight is
     undecided.
     """
+    from logs.verdict.rule_words import rule_word
+    from logs.verdict.wording import place_text
     from planfly.api import campaigns
 
     folder = _result_folder(args, "campaign")
     if args.refly is not None:
-        return _repeat_flight(args, folder)
+        # Fly one flight of a campaign again, with a log.
+        for option, target in (("--json", args.json), ("--junit", args.junit)):
+            if target:
+                message = f"{option}: cannot be combined with --refly, which flies a single flight"
+                raise PlanflyError(message, field=option, value=target)
+        flight = call_api(campaigns.campaign_flight, args, index=args.refly, out=folder)
+        row = flight.row
+        print(f"flight {args.refly}: {row.outcome}, ended: {row.ended} (as in the campaign's table)")
+        if row.undecided_text:
+            print(f"  Not judged: {row.undecided_text}")
+        for rule, place in row.failures:
+            print(f"  failed  {rule_word(rule)} at {place_text(place)}")
+        print(f"log       {flight.log}")
+        return {"flyable": FLYABLE, "undecided": INCOMPLETE}.get(row.outcome, NOT_FLYABLE)
     with _report_stored_flights(args, folder, "campaign.sqlite") as interruption_code:
         result = call_api(campaigns.campaign, args, out=folder)
     if interruption_code():
@@ -229,30 +244,6 @@ def _with_exit_code(file: Path, code: int) -> str:
 def _result_folder(args: argparse.Namespace, kind: str) -> Path:
     """Return the folder of the results: the named folder or ``runs/<name>-<kind>``."""
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
-
-
-def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
-    """Fly one flight of a campaign again, with a log; return the exit code of its outcome.
-
-    Raises PlanflyError if --json or --junit is also given.
-    """
-    from logs.verdict.rule_words import rule_word
-    from logs.verdict.wording import place_text
-    from planfly.api import campaigns
-
-    for option, target in (("--json", args.json), ("--junit", args.junit)):
-        if target:
-            raise PlanflyError(
-                f"{option}: cannot be combined with --refly, which flies a single flight", field=option, value=target
-            )
-    flight = call_api(campaigns.campaign_flight, args, index=args.refly, out=folder)
-    print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended} (as in the campaign's table)")
-    if flight.row.undecided_text:
-        print(f"  Not judged: {flight.row.undecided_text}")
-    for rule, place in flight.row.failures:
-        print(f"  failed  {rule_word(rule)} at {place_text(place)}")
-    print(f"log       {flight.log}")
-    return {"flyable": FLYABLE, "undecided": INCOMPLETE}.get(flight.row.outcome, NOT_FLYABLE)
 
 
 @contextmanager

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Suffixes of logs of other programs, as the help shows them.
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
+# Options that are not allowed with --for, because they belong to one autopilot or to a log.
+_SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight", "datum", "geometry")
 
 
 def add_mission_or_log_argument(parser: CommandParser) -> None:
@@ -81,10 +83,30 @@ def add_check_parser(command_line: LineParser) -> None:
 def check(args: argparse.Namespace) -> int:
     """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
     from planfly.api import flying
-    from planfly.terminal.verdict_lines import verdict_lines
+    from planfly.terminal.verdict_lines import autopilot_lines, verdict_lines
 
     if args.autopilots is not None:
-        return _check_for_each_autopilot(args)
+        # Fly the mission by each named autopilot; the worst verdict determines the exit code.
+        from planfly.terminal.verdict_answers import VerdictsDocument
+
+        for name in _SINGLE_AUTOPILOT_OPTIONS:
+            if (value := getattr(args, name)) not in (None, False):
+                allowed = "cannot be combined with --for, which flies with several autopilots"
+                raise ArgumentError.of_argument(name, value, allowed)
+        flights = call_api(flying.fly_by_each, args, mission=args.what)
+        verdicts = {name: flight.verdict for name, flight in flights.items()}
+        worst_code = max(verdict_code(verdict) for verdict in verdicts.values())
+        write_json_if_requested(
+            args,
+            lambda: VerdictsDocument(
+                exit_code=worst_code,
+                mission=args.what,
+                verdicts={name: verdict.document() for name, verdict in verdicts.items()},
+            ),
+        )
+        write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
+        print("\n".join(autopilot_lines(verdicts)))
+        return worst_code
     result = call_api(flying.judge, args)
     if not result.is_log:
         print_warnings(result.setup.scenario.notes)
@@ -93,37 +115,6 @@ def check(args: argparse.Namespace) -> int:
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
     print(*verdict_lines(result.verdict, result.setup.notes, result.setup, returns), sep="\n")
-    return code
-
-
-# Options that are not allowed with --for, because they belong to one autopilot or to a log.
-_SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight", "datum", "geometry")
-
-
-def _check_for_each_autopilot(args: argparse.Namespace) -> int:
-    """Fly a mission by each named autopilot, and return the exit code of the worst verdict."""
-    from planfly.api import flying
-    from planfly.terminal.verdict_answers import VerdictsDocument
-    from planfly.terminal.verdict_lines import autopilot_lines
-
-    for name in _SINGLE_AUTOPILOT_OPTIONS:
-        if (value := getattr(args, name)) not in (None, False):
-            raise ArgumentError.of_argument(
-                name, value, "cannot be combined with --for, which flies with several autopilots"
-            )
-    flights = call_api(flying.fly_by_each, args, mission=args.what)
-    verdicts = {name: flight.verdict for name, flight in flights.items()}
-    code = max(verdict_code(verdict) for verdict in verdicts.values())
-    write_json_if_requested(
-        args,
-        lambda: VerdictsDocument(
-            exit_code=code,
-            mission=args.what,
-            verdicts={name: verdict.document() for name, verdict in verdicts.items()},
-        ),
-    )
-    write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
-    print("\n".join(autopilot_lines(verdicts)))
     return code
 
 

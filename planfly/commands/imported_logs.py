@@ -65,7 +65,20 @@ def import_log(args: argparse.Namespace) -> int:
     from planfly.terminal.verdict_lines import verdict_lines
 
     if args.files is not None:
-        return _guess_columns(args)
+        # Write a table of columns guessed from data files, and print the number of guesses to check.
+        for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
+            if value is not None:
+                message = f"--columns-from cannot be combined with {name}, because it writes a table and no flight log"
+                raise PlanflyError(message, field=name)
+        guesses = imported.guess_columns(args.files, args.log, overwrite=args.overwrite)
+        print(f"table     {args.log}: {guesses.guesses} {'guess' if guesses.guesses == 1 else 'guesses'} to check")
+        for line in guesses.missing:
+            print(f"  {line}")
+        print(
+            f"next      check the table, then `planfly import {args.log} FLIGHT.mcap`, or"
+            f" `planfly aircraft --identify {args.log} ...`"
+        )
+        return FLYABLE
     if args.target is None:
         raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
     flight = call_api(imported.import_log, args)
@@ -75,25 +88,6 @@ def import_log(args: argparse.Namespace) -> int:
     write_json_if_requested(args, lambda: _import_answer(Path(args.target), flight, code))
     write_junit_if_requested(args, {args.log: flight.verdict})
     return code
-
-
-def _guess_columns(args: argparse.Namespace) -> int:
-    """Write a table of columns guessed from data files, and print the number of guesses to check."""
-    from planfly.api import imported
-
-    for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
-        if value is not None:
-            message = f"--columns-from cannot be combined with {name}, because it writes a table and no flight log"
-            raise PlanflyError(message, field=name)
-    guesses = imported.guess_columns(args.files, args.log, overwrite=args.overwrite)
-    print(f"table     {args.log}: {guesses.guesses} {'guess' if guesses.guesses == 1 else 'guesses'} to check")
-    for line in guesses.missing:
-        print(f"  {line}")
-    print(
-        f"next      check the table, then `planfly import {args.log} FLIGHT.mcap`, or"
-        f" `planfly aircraft --identify {args.log} ...`"
-    )
-    return FLYABLE
 
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:

@@ -60,7 +60,21 @@ def verdict_lines(
             other_places = "; ".join(finding.place_and_value for finding in other_findings[:_MAX_LISTED])
             more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
             lines.append(f"          also at {other_places}{more_text}")
-    no_change_text = _no_change_text(verdict, setup)
+    # State that no change passed its trial, unless a finding has a suggestion.  Findings on returns state their own
+    # remedy.  After a failed flight, this is stated only if the planned route fails, too.
+    is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
+    has_hint = any(finding.suggestions for finding in verdict.failed) or all(
+        finding.rule == "return" for finding in verdict.failed
+    )
+    no_change_text = ""
+    if is_judged and not has_hint and verdict.level == "geometric":
+        no_change_text = "no change was found with which it would pass"
+    elif is_judged and not has_hint:
+        geometry = next((level for level in verdict.levels if level.name == "geometry"), None)
+        if geometry is not None and not geometry.flyable and not geometry.undecided:
+            no_change_text = "no change was found with which a simulated flight would pass"
+            if setup is not None and has_geometric_suggestion(setup):
+                no_change_text += "; planfly check --geometry suggests changes for the planned route"
     lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
     undecided = verdict.undecided_findings
     lines += [f"  open    {finding_heading(finding)}: {finding.reason}" for finding in undecided[: 2 * _MAX_LISTED]]
@@ -78,28 +92,6 @@ def verdict_lines(
         text = f"returns   {returns.line}{requirement}; planfly returns tries every second of the flight"
         lines.insert(1 if is_warning else len(lines), colour_text(text, "warning") if is_warning else text)
     return lines
-
-
-def _no_change_text(verdict: Verdict, setup: FlightSetup | None) -> str:
-    """State that no change passed its trial if no failed finding has a suggestion; otherwise return "".
-
-    After a failed flight, the text is returned only if the planned route fails, too.
-    """
-    # Findings on returns state their own remedy.
-    is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
-    has_hint = any(finding.suggestions for finding in verdict.failed) or all(
-        finding.rule == "return" for finding in verdict.failed
-    )
-    if not is_judged or has_hint:
-        return ""
-    if verdict.level == "geometric":
-        return "no change was found with which it would pass"
-    if not any(level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels):
-        return ""
-    text = "no change was found with which a simulated flight would pass"
-    if setup is not None and has_geometric_suggestion(setup):
-        text += "; planfly check --geometry suggests changes for the planned route"
-    return text
 
 
 def _rule_summary(rule: RuleFindings) -> str:

@@ -41,8 +41,15 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 
     def is_excluded(candidate: float) -> bool:
         """Return True if the score test rejects a candidate for the difference."""
-        numerator = abs(only_second - only_first - pairs * candidate)
-        return numerator > quantile * _score_deviation(only_first, only_second, pairs, candidate)
+        # The probability that only the first trial succeeds is estimated by maximum likelihood for this difference: it
+        # is the larger root of Tango's quadratic equation.
+        a = 2.0 * pairs
+        b = -only_second - only_first + (2.0 * pairs - only_second + only_first) * candidate
+        c = -only_first * candidate * (1.0 - candidate)
+        probability = (math.sqrt(max(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a)
+        # The standard deviation of `only_second` - `only_first` if the candidate is the true difference.
+        deviation = math.sqrt(max(0.0, pairs * (2.0 * probability + candidate * (1.0 - candidate))))
+        return abs(only_second - only_first - pairs * candidate) > quantile * deviation
 
     def find_bound(excluded: float) -> float:
         """Return the bound of the interval that lies between the estimate and an excluded difference."""
@@ -57,24 +64,6 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
     discordant = only_first + only_second
     p_value = float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
     return ProportionDifference(value, Interval(find_bound(-1.0), find_bound(1.0)), p_value)
-
-
-def _score_deviation(only_first: int, only_second: int, pairs: int, difference: float) -> float:
-    """Return the standard deviation of `only_second` - `only_first`, if the true difference is given.
-
-    only_first, only_second: number of pairs in which only the first trial, or only the second, succeeds.
-    pairs: number of all pairs.
-
-    The probability that only the first trial succeeds is estimated by maximum likelihood for this difference: it is the
-    larger root of Tango's quadratic equation.
-
-    difference: true difference of the success probabilities, second minus first.
-    """
-    a = 2.0 * pairs
-    b = -only_second - only_first + (2.0 * pairs - only_second + only_first) * difference
-    c = -only_first * difference * (1.0 - difference)
-    probability = (math.sqrt(max(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a)
-    return math.sqrt(max(0.0, pairs * (2.0 * probability + difference * (1.0 - difference))))
 
 
 def independent_difference(

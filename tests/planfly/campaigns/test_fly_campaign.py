@@ -9,9 +9,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
@@ -21,8 +22,6 @@ from planfly.campaigns.flight_requests import LOST_REASON, FlightRequest, FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from planfly.campaigns.fly_campaign import (
     _FlightTally,
-    _fly_remaining,
-    _ProgressReport,
     fly_campaign,
     open_store,
     resumed_goal,
@@ -30,7 +29,7 @@ from planfly.campaigns.fly_campaign import (
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
 from planfly.campaigns.summary import summarise_campaign
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, read_stored_settings, read_table
-from planfly.campaigns.worker_pool import WorkerPool, Workers
+from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     all_fly,
@@ -92,18 +91,18 @@ def test_what_is_known_is_not_sent_again() -> None:
     assert sent == [2, 4, 5]
 
 
-def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_path: Path) -> None:
+def test_the_last_line_of_progress_counts_every_flight(
+    base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class AtOnce:
         def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[tuple[FlightRequest, FlightRow]]:
             while (order := next_request()) is not None:
                 yield order, made_flight(base, order.index, None)
 
     goal, told = Goal(None, False, 6), list[tuple[float, float, str]]()
-    estimator = Estimator(goal)
-    book = _FlightTally(estimator, goal)
-    pace = _ProgressReport(goal, estimator, book.tally, lambda *said: told.append(said))
+    monkeypatch.setattr("planfly.campaigns.fly_campaign.worker_pool", lambda *_: nullcontext(AtOnce()))
     with open_store(base, goal, tmp_path, resume=False) as store:
-        _fly_remaining(cast("WorkerPool", AtOnce()), book, store, pace)
+        fly_campaign(base, goal, Workers(1), store, lambda *said: told.append(said))
     # How many there are is said before the first; they were quicker than another line is due.
     assert [said[:2] for said in told] == [(0.0, 6.0), (6.0, 6.0)]
     assert told[-1][2].startswith("6 flights, probability ")
