@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import number_parser, parse_time_or_stations
 from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
+from planfly.terminal.control_characters import escape_controls
 from planfly.terminal.options import (
     add_log_argument,
     add_result_options,
@@ -17,7 +18,7 @@ from planfly.terminal.options import (
     print_and_flush,
     watch_stop_signals,
 )
-from planfly.terminal.output import escape_controls, plain_stream, warn_about_incomplete_log, write_json_if_requested
+from planfly.terminal.output import plain_stream, warn_about_incomplete_log, write_json_if_requested
 from world.errors import PlanflyError
 from world.running_clock import RunningClock
 

@@ -7,11 +7,9 @@ import itertools
 import json
 import math
 import os
-import re
 import sys
 import threading
 import time
-import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -19,7 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, send_progress_to
-from planfly.terminal.command_parser import BAD_INPUT, COLOUR_SEQUENCE, CommandParser, colour_text, wants_colour
+from planfly.terminal.command_parser import BAD_INPUT, CommandParser, colour_text, wants_colour
+from planfly.terminal.control_characters import escape_controls, escape_json_controls
 from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_atomically
@@ -28,42 +27,6 @@ if TYPE_CHECKING:
     from logs.recording.reader import FlightLog
     from logs.verdict.junit import JunitSuite
     from logs.verdict.verdict import Verdict
-
-# ----------------------------------------------------------------------
-# Escapes for control characters, so that no text of a foreign file controls the terminal.
-
-# Unicode categories of characters that move the cursor, reverse the text, or are not text.
-_CONTROLS = ("Cc", "Cf", "Cs", "Zl", "Zp")
-# Colour sequences of planfly, and any character beyond plain ASCII, which may be a control character.
-_COLOUR_OR_SPECIAL = re.compile(COLOUR_SEQUENCE + r"|[^\n\t\x20-\x7e]")
-_SPECIAL = re.compile(r"[^\n\t\x20-\x7e]")
-
-
-def escape_controls(text: str, *, colours: bool = False) -> str:
-    r"""Return a text with escapes for all control characters except line feeds and tabs.
-
-    colours: True to keep planfly's own colours.
-
-    >>> print(escape_controls("a\x1b[2J \u202e\x9b \xb0"))
-    a\x1b[2J \u202e\x9b °
-    """
-    return (_COLOUR_OR_SPECIAL if colours else _SPECIAL).sub(_escape, text)
-
-
-def _escape(match: re.Match[str]) -> str:
-    """Return the escape for a matched control character.
-
-    A match that is longer, or is another character, is returned unchanged.
-    """
-    text = match[0]
-    is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS
-    return text.encode("unicode_escape").decode() if is_control else text
-
-
-def escape_json_controls(text: str) -> str:
-    r"""Return JSON text in which control characters are replaced by JSON escapes such as \u009b."""
-    return _SPECIAL.sub(lambda match: match[0] if _escape(match) == match[0] else json.dumps(match[0])[1:-1], text)
-
 
 # ----------------------------------------------------------------------
 # Standard streams.  No text of a foreign file controls the terminal, and a closed pipe is tolerated:
