@@ -192,7 +192,8 @@ def test_unsafe_returns_of_a_flyable_mission_follow_its_first_line(
     (place,) = [number for number, line in enumerate(lines) if line.startswith("returns")]
     assert place == row % len(lines)
     required = "; the scenario requires no safe return" if row == 1 else ""
-    assert lines[place] == f"returns   all 3 returns violate a zone{required}; planfly returns tries every second of the flight"
+    hint = "planfly returns tries every second of the flight"
+    assert lines[place] == f"returns   all 3 returns violate a zone{required}; {hint}"
 
 
 def test_a_mission_without_a_home_has_no_line_on_returns(capsys: pytest.CaptureFixture[str]) -> None:
