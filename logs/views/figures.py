@@ -157,11 +157,7 @@ FIGURES = (
         alternative=lambda subject: f"Map, north up: {subject.contents_text}",
         caption=lambda subject: subject.text_if_flown(
             "The broad line is the plan, and the thin line on it is the flight."
-            + (
-                " At corners the two differ: the aircraft flies an arc."
-                if subject.setup.imported_log is None
-                else ""
-            ),
+            + (" At corners the two differ: the aircraft flies an arc." if subject.setup.imported_log is None else ""),
             "Nothing was flown: the line is the plan.",
         ),
         still=True,
