@@ -66,7 +66,6 @@ if TYPE_CHECKING:
     from planfly.api.aircraft import aircraft as aircraft
     from planfly.api.aircraft import describe_aircraft as describe_aircraft
     from planfly.api.aircraft import new_aircraft as new_aircraft
-    from planfly.api.assessing import ground_risk as ground_risk
     from planfly.api.campaigns import CampaignFlight as CampaignFlight
     from planfly.api.campaigns import battery as battery
     from planfly.api.campaigns import campaign as campaign
@@ -85,6 +84,7 @@ if TYPE_CHECKING:
     from planfly.api.flying import judge as judge
     from planfly.api.flying import plan_then_fly as plan_then_fly
     from planfly.api.fronts import plan_front as plan_front
+    from planfly.api.ground_risk import ground_risk as ground_risk
     from planfly.api.identifying import IdentifiedAircraft as IdentifiedAircraft
     from planfly.api.identifying import identify_aircraft as identify_aircraft
     from planfly.api.imported import ColumnGuesses as ColumnGuesses
@@ -179,7 +179,7 @@ _HOMES = {
             "IdentifiedAircraft",
             "identify_aircraft",
         ),
-        "planfly.api.assessing": ("ground_risk",),
+        "planfly.api.ground_risk": ("ground_risk",),
         "planfly.api.campaigns": (
             "CampaignFlight",
             "battery",

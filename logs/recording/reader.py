@@ -294,8 +294,7 @@ def read_log(path: Path | str) -> FlightLog:
     (True, 'completed', 366, 'aerosonde')
     """
     path = Path(path)
-    container = Container()
-    messages = _MessageCollector()
+    container, messages = Container(), _MessageCollector()
     try:
         if path.exists() and not path.is_file():
             raise LogError(f"{path}: {missing_text(path)}; expected a flight log (.mcap)", file=path)

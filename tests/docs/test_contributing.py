@@ -18,3 +18,16 @@ def test_every_path_is_there() -> None:
     missing = {path for path in named if f"/{path}" + ("" if path.endswith("/") else "\n") not in there}
     assert missing == set()
     assert len(named) > 100
+
+
+def test_every_name_is_in_the_code() -> None:
+    """A name in backticks that is written as Python's, and is no word of English, occurs in a source file."""
+    guide = re.sub(r"```.*?```", "", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    named = {name for name in re.findall(r"`(_?[A-Za-z]\w*)`", guide) if "_" in name or name.isupper()}
+    folders = ("planfly", "logs", "flight", "planner", "aircraft", "world", "tests", "docs/making")
+    code = "\n".join(file.read_text(encoding="utf-8") for folder in folders for file in (ROOT / folder).rglob("*.py"))
+    words = set(re.findall(r"\w+", code))
+    # Capitals stand for a name to choose; a unit is the end of a name.
+    units = {"_M", "_S", "_MPS", "_DEG", "_RAD"}
+    assert {name for name in named - words - units if "NAME" not in name} == set()
+    assert len(named) > 60
