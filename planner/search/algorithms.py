@@ -124,7 +124,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             optimiser="differential",
         ),
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
-        Algorithm("umda", "the paper's UMDA in the rotated frame: violations counted at six points per leg, no seeds"),
+        Algorithm("umda", "UMDA as in the paper (Yang et al. 2014): rotated frame, violations counted at six points per leg, no first paths"),
         Algorithm("umda-cartesian", "a baseline of the paper: UMDA on Cartesian waypoints", encoding="cartesian"),
         Algorithm(
             "umda-polar",
