@@ -408,25 +408,26 @@ class _Runs:
         min_length = min(length, other_length)
         if min_length < _MIN_LINE_LENGTH_M:
             return None
-        start, end = (self._track_offsets(run, waypoint) for waypoint in self.runs[other_run])
-        if abs(end[0] - start[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
+        # Along-track and cross-track (right positive) distances of the other run's ends from the run's start, m.
+        start_east, start_north = self._positions[self.runs[run][0]]
+        course_east, course_north = self._directions[run]
+        along, right = [], []
+        for waypoint in self.runs[other_run]:
+            east, north = self._positions[waypoint]
+            east, north = east - start_east, north - start_north
+            along.append(east * course_east + north * course_north)
+            right.append(east * course_north - north * course_east)
+        if abs(along[1] - along[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
             return None
-        spacing = abs(0.5 * (start[1] + end[1]))
-        overlap = min(length, max(start[0], end[0])) - max(0.0, min(start[0], end[0]))
+        spacing = abs(0.5 * (right[0] + right[1]))
+        overlap = min(length, max(along)) - max(0.0, min(along))
         if (
             overlap < _MIN_OVERLAP_FRACTION * min_length
             or spacing < _MIN_LINE_SPACING_M
-            or abs(end[1] - start[1]) > _MAX_SPACING_CHANGE_RATIO * spacing
+            or abs(right[1] - right[0]) > _MAX_SPACING_CHANGE_RATIO * spacing
         ):
             return None
         return spacing
-
-    def _track_offsets(self, run: int, waypoint: int) -> tuple[float, float]:
-        """Return a waypoint's along-track and cross-track (right positive) distances from a run's start, m."""
-        (start_east, start_north), (east, north) = self._positions[self.runs[run][0]], self._positions[waypoint]
-        course_east, course_north = self._directions[run]
-        east, north = east - start_east, north - start_north
-        return east * course_east + north * course_north, east * course_north - north * course_east
 
     def next_lines(self, run: int) -> list[int]:
         """Return the runs with which the next line after a run may start, in flying order."""
@@ -476,22 +477,18 @@ def _find_chain(runs: _Runs, start: int) -> list[_Line]:
     while len(chain) > _MIN_LINES_WITH_PHOTOS:
         # The last line may be a turn-around of the next survey, whose lines are perpendicular.
         (_, previous_run), last_line = chain[-2:]
+        next_chains = (_follow_lines(runs, first_run) for first_run in range(previous_run + 1, last_line[0]))
         if not any(
-            _is_turn_around(_follow_lines(runs, first_run), last_line, runs)
-            for first_run in range(previous_run + 1, last_line[0])
+            before[1] < last_line[0]
+            and last_line[1] < after[0]
+            and runs.length(last_line) < _TURN_AROUND_LENGTH_RATIO * min(runs.length(before), runs.length(after))
+            for next_chain in next_chains
+            if len(next_chain) >= _MIN_LINES
+            for before, after in pairwise(next_chain)
         ):
             break
         chain.pop()
     return chain
-
-
-def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
-    """Return True if a line is only a turn-around between two longer lines of another survey."""
-    enclosing_pairs = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
-    length = runs.length(line)
-    return len(chain) >= _MIN_LINES and any(
-        length < _TURN_AROUND_LENGTH_RATIO * min(map(runs.length, pair)) for pair in enclosing_pairs
-    )
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
