@@ -614,10 +614,24 @@ def _remove_leads(
     """
     for photo_spacing, lead in turn_arounds:
         if abs(photo_spacing - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:
-            shortened = tuple(_remove_lead(points, line, lead) for line in lines)
+            tolerance, shortened = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead), []
+            for line in lines:
+                # The inner waypoints at the length of a lead from the start, and from the end of the line's run.
+                from_start, from_end = (
+                    [
+                        i
+                        for i in range(line.first + 1, line.last)
+                        if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= tolerance
+                    ]
+                    for end in (line.begins, line.ends)
+                )
+                first = from_start[0] if from_start and line.first == line.begins else line.first
+                last = from_end[-1] if from_end and line.last == line.ends else line.last
+                # A line of which no leg would remain is unchanged.
+                shortened.append(line._replace(first=first, last=last) if first < last else line)
             # If no line changes, the mission was edited after the ground station stored the length.
-            if shortened != lines:
-                return shortened
+            if tuple(shortened) != lines:
+                return tuple(shortened)
     lengths = leg_runs(points)
     if any(line.ends - line.begins < _MIN_LEGS_WITH_LEADS for line in lines):
         return lines
@@ -643,21 +657,3 @@ def _remove_leads(
     inner_lines[0] = inner_lines[0]._replace(first=first_waypoints[0])
     inner_lines[-1] = inner_lines[-1]._replace(last=last_waypoints[-1])
     return tuple(inner_lines)
-
-
-def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
-    """Return a line shortened by a lead of ``lead_length`` (m) at each end of its run.
-
-    An end is unchanged if no waypoint lies at this distance from it. The line is unchanged if no leg would remain.
-    """
-    inner_waypoints = range(line.first + 1, line.last)
-    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
-
-    def points_at_lead_distance(end: int) -> list[int]:
-        """Return the waypoints at the length of a lead from an end of the run."""
-        return [i for i in inner_waypoints if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
-
-    start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
-    first = start_points[0] if start_points and line.first == line.begins else line.first
-    last = end_points[-1] if end_points and line.last == line.ends else line.last
-    return line._replace(first=first, last=last) if first < last else line

@@ -232,7 +232,19 @@ def parse_sheet(
             allowed = f"allowed {min_value:g}..{max_value:g} {unit}"
             raise FlightError.of_argument(name, value, allowed, shown=f"{value} {unit}")
         values[name] = value * factor
-    volts, energy = _parse_battery(battery) if battery is not None else (0.0, 0.0)
+    volts, watt_hours = 0.0, 0.0
+    if battery is not None:
+        match = _BATTERY_PATTERN.fullmatch(battery.strip())
+        volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+        unit = match[3].lower() if match else ""
+        watt_hours = capacity if unit == "wh" else volts * capacity * (0.001 if unit == "mah" else 1.0)
+        (min_volts, max_volts), (min_energy, max_energy) = _VOLTAGE_RANGE_V, _ENERGY_RANGE_WH
+        if not (min_volts <= volts <= max_volts and min_energy <= watt_hours <= max_energy):
+            allowed = (
+                f"expected volts and capacity, such as 14.8V,5Ah; allowed {min_volts:g}..{max_volts:g}"
+                f" V, {min_energy:g}..{max_energy:g} Wh"
+            )
+            raise FlightError.of_argument("battery", battery, allowed)
     diameter, pitch = 0.0, 0.0  # inches
     if prop is not None:
         match = _PROPELLER_PATTERN.fullmatch(prop.strip())
@@ -248,27 +260,9 @@ def parse_sheet(
     if layout is not None and layout not in list(layouts):
         raise FlightError.of_argument("layout", layout, f"expected {', '.join(layouts)}")
     sheet_values = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
-    return DataSheet(**sheet_values, volts=volts, energy=energy, propeller=propeller, layout=layouts[layout or "tail"])
-
-
-def _parse_battery(text: str) -> tuple[float, float]:
-    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".
-
-    Raises FlightError for invalid text.
-    """
-    match = _BATTERY_PATTERN.fullmatch(text.strip())
-    volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
-    unit = match[3].lower() if match else ""
-    watt_hours = capacity if unit == "wh" else volts * capacity * (0.001 if unit == "mah" else 1.0)
-    if not (
-        _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
-    ):
-        allowed = (
-            f"expected volts and capacity, such as 14.8V,5Ah; allowed {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g}"
-            f" V, {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
-        )
-        raise FlightError.of_argument("battery", text, allowed)
-    return volts, 3600.0 * watt_hours
+    return DataSheet(
+        **sheet_values, volts=volts, energy=3600.0 * watt_hours, propeller=propeller, layout=layouts[layout or "tail"]
+    )
 
 
 def _parse_number(text: str) -> float:
