@@ -58,7 +58,15 @@ def plan_mission(
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
     procedures = plan.procedures or DepartureAndApproach()
-    points = _mission_positions(plan, procedures)
+    # The navigation items, from above home to the landing point; the landing has the altitude of the last waypoint of
+    # the final approach.
+    parts = [plan.waypoints]
+    if (climb := procedures.climb) is not None:
+        parts = [np.append(climb.home[:2], climb.up)[None], climb.waypoints, *parts]
+    if (descent := procedures.descent) is not None:
+        above_landing = np.append(descent.point[:2], descent.final_waypoints[-1, 2])
+        parts = [*parts, descent.waypoints, descent.final_waypoints, above_landing[None]]
+    points = np.concatenate(parts)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     # Home is the scenario's home, or the ground below the start; the start itself if the ground is unknown.
     scenario = plan.scenario
@@ -117,20 +125,6 @@ class _ItemBuilder:
             frame, up = Frame.GLOBAL, _round_to_thousandths(float(position[2]))
             lat, lon = (round_to_grid(float(value)) for value in to_geo(self._origin, position[0], position[1]))
         self.items.append(MissionItem(len(self.items) + 1, int(command), int(frame), params, lat, lon, up))
-
-
-def _mission_positions(plan: Plan, procedures: DepartureAndApproach) -> Floats:
-    """Return the positions of a plan's navigation items, from above home to the landing point, (w, 3) m.
-
-    The position of the landing has the altitude of the last waypoint of the final approach.
-    """
-    parts = [plan.waypoints]
-    if (climb := procedures.climb) is not None:
-        parts = [np.append(climb.home[:2], climb.up)[None], climb.waypoints, *parts]
-    if (descent := procedures.descent) is not None:
-        above_landing = np.append(descent.point[:2], descent.final_waypoints[-1, 2])
-        parts = [*parts, descent.waypoints, descent.final_waypoints, above_landing[None]]
-    return np.concatenate(parts)
 
 
 def acceptance_radii(

@@ -36,26 +36,28 @@ class Notes:
             items.append(seq)
 
     def lines(self) -> tuple[str, ...]:
-        """Return one line per note: "items 3-5, 9: DO_SET_SERVO is not flown"."""
+        """Return one line per note: "items 3-5, 9: DO_SET_SERVO is not flown".
+
+        Beyond `_MAX_LISTED_RANGES` ranges, the remaining items are counted: "items 3-5, 9, 12 and 3 more".
+        """
         lines = []
         for text, items in self._items.items():
             numbers = sorted(set(items))
-            label = f"item{'s' if len(numbers) > 1 else ''} {_range_text(numbers)}: " if numbers else ""
-            lines.append(label + text)
+            if not numbers:
+                lines.append(text)
+                continue
+            ranges: list[list[int]] = []
+            for number in numbers:
+                if not ranges or number > ranges[-1][1] + 1:
+                    ranges.append([number, number])
+                ranges[-1][1] = number
+            listed = ranges[:_MAX_LISTED_RANGES]
+            range_text = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in listed)
+            unlisted_count = len(numbers) - sum(last - first + 1 for first, last in listed)
+            if unlisted_count:
+                range_text += f" and {unlisted_count} more"
+            lines.append(f"item{'s' if len(numbers) > 1 else ''} {range_text}: {text}")
         return tuple(lines)
-
-
-def _range_text(numbers: list[int]) -> str:
-    """Format sorted numbers, with consecutive numbers as ranges: "3-5, 9", or "3-5, 9, 12 and 3 more"."""
-    ranges: list[list[int]] = []
-    for number in numbers:
-        if not ranges or number > ranges[-1][1] + 1:
-            ranges.append([number, number])
-        ranges[-1][1] = number
-    listed = ranges[:_MAX_LISTED_RANGES]
-    text = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in listed)
-    unlisted_count = len(numbers) - sum(last - first + 1 for first, last in listed)
-    return f"{text} and {unlisted_count} more" if unlisted_count else text
 
 
 # Largest number of ranges of items that a note lists; the other items are counted.

@@ -574,7 +574,16 @@ class _ItineraryBuilder:
         elif target.command in PLACES:
             self._add_stop(target)
         elif target.command == Command.NAV_RETURN_TO_LAUNCH:
-            self._add_return(target)
+            if not self.has_home and self.home is self.first_home:
+                self.add_open_item("NAV_RETURN_TO_LAUNCH without a home is not flown", target.seq)
+            elif not self.stops:
+                self.add_open_item("NAV_RETURN_TO_LAUNCH before the start is not flown", target.seq)
+            else:
+                # The RTL ends the mission.  The autopilot chooses destination and altitude:
+                # `flight.mission.return_path`.  Earlier speed changes do not apply to the RTL.
+                home = replace(target, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
+                self.stops.append(replace(self._make_stop(home), airspeed=math.nan, px4_airspeed=math.nan))
+                self.has_ended = True
         elif target.command in LANDINGS:
             self._add_landing(target)
         else:
@@ -630,7 +639,17 @@ class _ItineraryBuilder:
         if not item.autocontinue:
             self._note_wait(item)
         if item.command == Command.DO_CHANGE_SPEED:
-            self._change_speed_as_px4(item)
+            # As in PX4's `navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED.
+            speed_type, speed, throttle = item.params[:3]
+            self.px4_airspeed = speed if speed > 0.0 else math.nan
+            if not speed > 0.0:
+                text = f"DO_CHANGE_SPEED to {speed:g} m/s returns to PX4's default airspeed"
+                self.notes.px4.add(text, item.seq)
+                if throttle > 0.0:
+                    self.notes.px4.add("DO_CHANGE_SPEED's throttle is not flown", item.seq)
+            elif speed_type != 0.0:
+                text = f"DO_CHANGE_SPEED of type {speed_type:g} is flown as airspeed, because PX4 ignores the type"
+                self.notes.px4.add(text, item.seq)
         elif item.command == Command.CONDITION_GATE:
             # PX4 passes a gate at once if it has no position or precedes the start.
             if item.has_position and self.stops:
@@ -791,22 +810,6 @@ class _ItineraryBuilder:
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
         self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
-    def _add_return(self, item: MissionItem) -> None:
-        """Add an RTL, which ends the mission.
-
-        Without a home or a previous stop the RTL is not flown.
-        """
-        if not self.has_home and self.home is self.first_home:
-            self.add_open_item("NAV_RETURN_TO_LAUNCH without a home is not flown", item.seq)
-        elif not self.stops:
-            self.add_open_item("NAV_RETURN_TO_LAUNCH before the start is not flown", item.seq)
-        else:
-            # The autopilot chooses destination and altitude: `flight.mission.return_path`. Earlier speed changes do not
-            # apply to the RTL.
-            home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
-            self.stops.append(replace(self._make_stop(home), airspeed=math.nan, px4_airspeed=math.nan))
-            self.has_ended = True
-
     def _add_landing(self, item: MissionItem) -> None:
         """Add a landing, which ends the mission above the landing point."""
         name = command_name(item.command)
@@ -875,23 +878,6 @@ class _ItineraryBuilder:
             self.airspeed = speed
         elif speed != -1.0:
             notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s is ignored", item.seq)
-
-    def _change_speed_as_px4(self, item: MissionItem) -> None:
-        """Apply a DO_CHANGE_SPEED as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
-        speed_type, speed, throttle = item.params[:3]
-        notes = self.notes.px4
-        if speed > 0.0:
-            self.px4_airspeed = speed
-            if speed_type != 0.0:
-                notes.add(
-                    f"DO_CHANGE_SPEED of type {speed_type:g} is flown as airspeed, because PX4 ignores the type",
-                    item.seq,
-                )
-            return
-        self.px4_airspeed = math.nan
-        notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s returns to PX4's default airspeed", item.seq)
-        if throttle > 0.0:
-            notes.add("DO_CHANGE_SPEED's throttle is not flown", item.seq)
 
 
 def _error_without_position(mission: Mission) -> MissionError:

@@ -408,25 +408,26 @@ class _Runs:
         min_length = min(length, other_length)
         if min_length < _MIN_LINE_LENGTH_M:
             return None
-        start, end = (self._track_offsets(run, waypoint) for waypoint in self.runs[other_run])
-        if abs(end[0] - start[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
+        # Along-track and cross-track (right positive) distances of the other run's ends from the run's start, m.
+        start_east, start_north = self._positions[self.runs[run][0]]
+        course_east, course_north = self._directions[run]
+        along, right = [], []
+        for waypoint in self.runs[other_run]:
+            east, north = self._positions[waypoint]
+            east, north = east - start_east, north - start_north
+            along.append(east * course_east + north * course_north)
+            right.append(east * course_north - north * course_east)
+        if abs(along[1] - along[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
             return None
-        spacing = abs(0.5 * (start[1] + end[1]))
-        overlap = min(length, max(start[0], end[0])) - max(0.0, min(start[0], end[0]))
+        spacing = abs(0.5 * (right[0] + right[1]))
+        overlap = min(length, max(along)) - max(0.0, min(along))
         if (
             overlap < _MIN_OVERLAP_FRACTION * min_length
             or spacing < _MIN_LINE_SPACING_M
-            or abs(end[1] - start[1]) > _MAX_SPACING_CHANGE_RATIO * spacing
+            or abs(right[1] - right[0]) > _MAX_SPACING_CHANGE_RATIO * spacing
         ):
             return None
         return spacing
-
-    def _track_offsets(self, run: int, waypoint: int) -> tuple[float, float]:
-        """Return a waypoint's along-track and cross-track (right positive) distances from a run's start, m."""
-        (start_east, start_north), (east, north) = self._positions[self.runs[run][0]], self._positions[waypoint]
-        course_east, course_north = self._directions[run]
-        east, north = east - start_east, north - start_north
-        return east * course_east + north * course_north, east * course_north - north * course_east
 
     def next_lines(self, run: int) -> list[int]:
         """Return the runs with which the next line after a run may start, in flying order."""
@@ -476,22 +477,18 @@ def _find_chain(runs: _Runs, start: int) -> list[_Line]:
     while len(chain) > _MIN_LINES_WITH_PHOTOS:
         # The last line may be a turn-around of the next survey, whose lines are perpendicular.
         (_, previous_run), last_line = chain[-2:]
+        next_chains = (_follow_lines(runs, first_run) for first_run in range(previous_run + 1, last_line[0]))
         if not any(
-            _is_turn_around(_follow_lines(runs, first_run), last_line, runs)
-            for first_run in range(previous_run + 1, last_line[0])
+            before[1] < last_line[0]
+            and last_line[1] < after[0]
+            and runs.length(last_line) < _TURN_AROUND_LENGTH_RATIO * min(runs.length(before), runs.length(after))
+            for next_chain in next_chains
+            if len(next_chain) >= _MIN_LINES
+            for before, after in pairwise(next_chain)
         ):
             break
         chain.pop()
     return chain
-
-
-def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
-    """Return True if a line is only a turn-around between two longer lines of another survey."""
-    enclosing_pairs = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
-    length = runs.length(line)
-    return len(chain) >= _MIN_LINES and any(
-        length < _TURN_AROUND_LENGTH_RATIO * min(map(runs.length, pair)) for pair in enclosing_pairs
-    )
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
@@ -617,10 +614,24 @@ def _remove_leads(
     """
     for photo_spacing, lead in turn_arounds:
         if abs(photo_spacing - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:
-            shortened = tuple(_remove_lead(points, line, lead) for line in lines)
+            tolerance, shortened = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead), []
+            for line in lines:
+                # The inner waypoints at the length of a lead from the start, and from the end of the line's run.
+                from_start, from_end = (
+                    [
+                        i
+                        for i in range(line.first + 1, line.last)
+                        if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= tolerance
+                    ]
+                    for end in (line.begins, line.ends)
+                )
+                first = from_start[0] if from_start and line.first == line.begins else line.first
+                last = from_end[-1] if from_end and line.last == line.ends else line.last
+                # A line of which no leg would remain is unchanged.
+                shortened.append(line._replace(first=first, last=last) if first < last else line)
             # If no line changes, the mission was edited after the ground station stored the length.
-            if shortened != lines:
-                return shortened
+            if tuple(shortened) != lines:
+                return tuple(shortened)
     lengths = leg_runs(points)
     if any(line.ends - line.begins < _MIN_LEGS_WITH_LEADS for line in lines):
         return lines
@@ -646,21 +657,3 @@ def _remove_leads(
     inner_lines[0] = inner_lines[0]._replace(first=first_waypoints[0])
     inner_lines[-1] = inner_lines[-1]._replace(last=last_waypoints[-1])
     return tuple(inner_lines)
-
-
-def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
-    """Return a line shortened by a lead of ``lead_length`` (m) at each end of its run.
-
-    An end is unchanged if no waypoint lies at this distance from it. The line is unchanged if no leg would remain.
-    """
-    inner_waypoints = range(line.first + 1, line.last)
-    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
-
-    def points_at_lead_distance(end: int) -> list[int]:
-        """Return the waypoints at the length of a lead from an end of the run."""
-        return [i for i in inner_waypoints if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
-
-    start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
-    first = start_points[0] if start_points and line.first == line.begins else line.first
-    last = end_points[-1] if end_points and line.last == line.ends else line.last
-    return line._replace(first=first, last=last) if first < last else line

@@ -172,8 +172,19 @@ def parse_mission(text: str, source: str) -> Mission:
     locations: list[TextLine] = []
     has_current = False
     for location, columns in _read_rows(text, source):
-        integers = {name: _parse_integer(location, name, columns[name]) for name in _ALLOWED_RANGES}
-        p1, p2, p3, p4, lat, lon, alt = (_parse_number(location, name, columns[name]) for name in _COLUMNS[4:11])
+        for name, (min_value, max_value) in _ALLOWED_RANGES.items():
+            value = columns[name]
+            if not _WHOLE_NUMBER.fullmatch(value) or not min_value <= int(value) <= max_value:
+                allowed = f"expected a whole number {min_value}..{max_value}"
+                raise _value_error(location, name, value, _short_repr(value), allowed)
+        for name in _COLUMNS[4:11]:
+            value = columns[name]
+            if not _NUMBER.fullmatch(value) or not math.isfinite(float(value)):
+                hint = " (a decimal comma?)" if "," in value else ""
+                raise _value_error(location, name, value, _short_repr(value), f"expected a finite number{hint}")
+        integers = {name: int(columns[name]) for name in _ALLOWED_RANGES}
+        # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
+        p1, p2, p3, p4, lat, lon, alt = (float(columns[name]) + 0.0 for name in _COLUMNS[4:11])
         # A home line of Mission Planner may carry command 0.
         command = int(integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0))
         frame, continues = integers["frame"], bool(integers["autocontinue"])
@@ -249,23 +260,6 @@ def _value_error(location: TextLine, field: str, value: str | int, value_text: s
     return MissionError(
         f"{location}: {field} {value_text}: {allowed}", file=location.file, field=field, value=value, allowed=allowed
     )
-
-
-def _parse_integer(location: TextLine, name: str, text: str) -> int:
-    """Return the integer in a column. Raises MissionError for any other text."""
-    min_value, max_value = _ALLOWED_RANGES[name]
-    if not _WHOLE_NUMBER.fullmatch(text) or not min_value <= int(text) <= max_value:
-        raise _value_error(location, name, text, _short_repr(text), f"expected a whole number {min_value}..{max_value}")
-    return int(text)
-
-
-def _parse_number(location: TextLine, name: str, text: str) -> float:
-    """Return the number in a column. Raises MissionError for any other text."""
-    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
-        hint = " (a decimal comma?)" if "," in text else ""
-        raise _value_error(location, name, text, _short_repr(text), f"expected a finite number{hint}")
-    # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
-    return float(text) + 0.0
 
 
 def _begins_with_home(items: list[MissionItem]) -> bool:

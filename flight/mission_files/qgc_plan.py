@@ -378,7 +378,14 @@ def parse_plan_file(text: str, source: str) -> Mission:
         allowed = "not an autopilot that planfly simulates; expected 3 (ArduPilot), 12 (PX4) or 0 (not stated)"
         raise MissionError.at(source, "mission.firmwareType", firmware, allowed)
     autopilot = _FIRMWARES.get(firmware, "")
-    items = [_read_item(item, index, source) for index, item in enumerate(file.mission.items)]
+    items = []
+    for index, item in enumerate(file.mission.items):
+        p1, p2, p3, p4, lat, lon, alt = (math.nan if value is None else value + 0.0 for value in item.params)
+        if is_located(item.command, item.frame) and position_problem(lat, lon) is None:
+            lat, lon = round_to_grid(lat), round_to_grid(lon)
+        seq = index + 1 if item.doJumpId is None else item.doJumpId
+        mission_item = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
+        items.append(_checked_item(mission_item, source, f"mission.items.{index} (item {seq})"))
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
     for index, (previous, following) in enumerate(pairwise(items), 1):
@@ -441,19 +448,6 @@ def _expand_complex_items(data: Any, source: str) -> tuple[list[str], list[Surve
             warnings.append(f"{source}: {key}: version {json.dumps(part.get('version'))[:20]}: not read; 2 is known")
             data[key] = {}
     return warnings, plans
-
-
-def _read_item(item: _Item, index: int, source: str) -> MissionItem:
-    """Convert an item of the file to a mission item. Raises MissionError if it is invalid.
-
-    index: index in the file's list; without a doJumpId the item's number is the index + 1.
-    """
-    p1, p2, p3, p4, lat, lon, alt = (math.nan if value is None else value + 0.0 for value in item.params)
-    if is_located(item.command, item.frame) and position_problem(lat, lon) is None:
-        lat, lon = round_to_grid(lat), round_to_grid(lon)
-    seq = index + 1 if item.doJumpId is None else item.doJumpId
-    mission_item = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
-    return _checked_item(mission_item, source, f"mission.items.{index} (item {seq})")
 
 
 def _checked_item(item: MissionItem, source: str, location: str) -> MissionItem:

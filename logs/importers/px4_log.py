@@ -251,11 +251,20 @@ class Topics:
             velocity = LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
         winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
         battery = self.battery()
+        # An airspeed that is always 0 was not measured.
+        airspeed = None
+        for topic in ("airspeed_validated", "airspeed"):
+            table = self.table(topic, ("true_airspeed_m_s",))
+            if table is not None:
+                is_finite = np.isfinite(table.values[:, 0])
+                if np.any(table.values[is_finite]):
+                    airspeed = LogSeries(topic, table.time[is_finite], table.values[is_finite])
+                    break
         tables = {
             "position": position if position is not None else gps,
             "velocity": velocity,
             "attitude": self.attitude(),
-            "airspeed": self._read_airspeed(),
+            "airspeed": airspeed,
             "wind": next((wind for wind in winds if wind is not None and np.any(wind.values)), None),
             "battery": None if battery is None else with_used_energy(battery),
             "throttle": self.table("actuator_controls_0", ("control[3]",)),
@@ -280,6 +289,15 @@ class Topics:
             if state != last_state:
                 modes.append(ModeChange(float(time) * 1e-6, *describe_px4_state(int(state))))
                 last_state = state
+        # UTC time at time 0 of the log's clock, s since 1970; NaN if no GPS time is logged.
+        utc_start = math.nan
+        for topic in ("vehicle_gps_position", "sensor_gps"):
+            data = self._data.get(topic, {})
+            stamps = np.asarray(data.get("time_utc_usec", ()), dtype=np.float64)
+            valid_rows = np.flatnonzero(stamps > 0.0)
+            if valid_rows.size:
+                utc_start = float((stamps[valid_rows[0]] - float(data["timestamp"][valid_rows[0]])) * 1e-6)
+                break
         return RawLog(
             source=self._source,
             format=FORMAT,
@@ -292,7 +310,7 @@ class Topics:
             missions=tuple(self._read_missions()),
             parameters=self.parameters(),
             events=tuple((message.timestamp * 1e-6, str(message.message)) for message in self._log.logged_messages),
-            utc_start=self._find_utc_start(),
+            utc_start=utc_start,
             damage=replace(self._damage, places=self._damage.places + len(self._log.dropouts)),
         )
 
@@ -331,16 +349,6 @@ class Topics:
         pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return LogSeries(quaternions.source, quaternions.time, np.stack([roll, pitch, yaw], axis=1))
-
-    def _read_airspeed(self) -> LogSeries | None:
-        """Return the true airspeed, m/s, (n, 1); None if not logged or always 0."""
-        for topic in ("airspeed_validated", "airspeed"):
-            airspeed = self.table(topic, ("true_airspeed_m_s",))
-            if airspeed is not None:
-                is_finite = np.isfinite(airspeed.values[:, 0])
-                if is_finite.any() and np.any(airspeed.values[is_finite]):
-                    return LogSeries(topic, airspeed.time[is_finite], airspeed.values[is_finite])
-        return None
 
     def battery(self) -> LogSeries | None:
         """Return the mean voltage (V) of all connected batteries and the sum of their currents (A), (n, 2).
@@ -449,14 +457,3 @@ class Topics:
         if isinstance(release, int):
             return f"{name} v{release >> 24 & 0xFF}.{release >> 16 & 0xFF}.{release >> 8 & 0xFF}"
         return name
-
-    def _find_utc_start(self) -> float:
-        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if no GPS time is logged."""
-        for topic in ("vehicle_gps_position", "sensor_gps"):
-            data = self._data.get(topic, {})
-            if "time_utc_usec" in data:
-                stamps = np.asarray(data["time_utc_usec"], dtype=np.float64)
-                valid_rows = np.flatnonzero(stamps > 0.0)
-                if valid_rows.size:
-                    return float((stamps[valid_rows[0]] - float(data["timestamp"][valid_rows[0]])) * 1e-6)
-        return math.nan

@@ -7,7 +7,7 @@ from flight.simulation.track import Track
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text, site_text
-from logs.verdict.returns.judge_glides import REACHES, Glide, Reach
+from logs.verdict.returns.judge_glides import REACHES, Reach
 from logs.views.charts import Label, Layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.returns import east_and_north, path_layers, split_path_by_reach
@@ -32,7 +32,13 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
     layers = make_footprint_layers(drawn_returns, extent)
     segments = split_path_by_reach(setup, drawn_returns, track)
     layers += path_layers(
-        segments, _ROLES_AND_NAMES, east_and_north, lambda point: _describe_glide(point.element, drawn_returns)
+        segments,
+        _ROLES_AND_NAMES,
+        east_and_north,
+        lambda point: (
+            f"{point.element.time:.0f} s: {reached_text(point.element.reach)}"
+            + (f", {left:.0f} m of altitude to spare" if (left := glides.altitude_left(point.element)) >= 0.0 else "")
+        ),
     )
     impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
     if len(impacts):
@@ -54,13 +60,6 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
         route=route,
         winds=(NamedWind(scenario.wind),),
     )
-
-
-def _describe_glide(glide: Glide, drawn_returns: DrawnReturns) -> str:
-    """Return the hover text of a glide: its best destination, and the altitude to spare."""
-    altitude_left = drawn_returns.glides.altitude_left(glide)
-    left_text = f", {altitude_left:.0f} m of altitude to spare" if altitude_left >= 0.0 else ""
-    return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 
 def make_footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:

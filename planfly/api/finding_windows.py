@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -76,14 +77,19 @@ def window(
         step = timedelta(minutes=number) if match.group(2) == "min" else timedelta(hours=number)
     if not _MIN_STEP <= step <= _MAX_STEP:
         raise ArgumentError.of_argument("every", every, "expected a time such as 30min or 1h, from 1min to 24h")
-    departure, first, last = (
-        None if text is None else _parse_time(name, text)
-        for name, text in (("at", options["at"]), ("earliest", earliest), ("latest", latest))
-    )
+    times: list[datetime | None] = []
+    for name, text in (("at", options["at"]), ("earliest", earliest), ("latest", latest)):
+        time = None
+        with suppress(ValueError):
+            time = None if text is None else datetime.fromisoformat(text)
+        if text is not None and (time is None or time.tzinfo is None):
+            allowed = "expected a time in ISO 8601 format with its offset from UTC, such as 2026-05-01T10:00+02:00"
+            raise ArgumentError.of_argument(name, text, allowed)
+        times.append(None if time is None else time.astimezone(UTC))
+    departure, first, last = times[0], times[1] or times[0], times[2]
     if out is not None:
         check_output_folder(Path(out), overwrite)
     workers = make_workers(options["workers"], options["scheduler"], options["seed"])
-    first = first or departure
     if first is None:
         allowed = "missing; state the first time of take-off, or `at` TIME"
         raise ArgumentError.of_argument("earliest", None, allowed, shown="")
@@ -133,15 +139,3 @@ def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Se
             raise ArgumentError.of_argument("forecast", None, allowed, shown="")
         return base
     raise errors[0]
-
-
-def _parse_time(name: str, text: str) -> datetime:
-    """Return a time of take-off in UTC.  Raises ArgumentError if the text is not a time with an offset."""
-    try:
-        time = datetime.fromisoformat(text)
-    except ValueError:
-        time = None
-    if time is None or time.tzinfo is None:
-        allowed = "expected a time in ISO 8601 format with its offset from UTC, such as 2026-05-01T10:00+02:00"
-        raise ArgumentError.of_argument(name, text, allowed)
-    return time.astimezone(UTC)

@@ -137,7 +137,14 @@ def identify_aircraft(
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}", "reading logs"):
         motion_logs = [read_motion(path) for path in paths]
         check_motion = None if check is None else read_motion(Path(check))
-        _check_distinct([*motion_logs, *([] if check_motion is None else [check_motion])])
+        all_motion = [*motion_logs, *([] if check_motion is None else [check_motion])]
+        for number, log in enumerate(all_motion):
+            for earlier_log in all_motion[:number]:
+                overlap = min(log.span[1], earlier_log.span[1]) - max(log.span[0], earlier_log.span[0])
+                if log.sha256 == earlier_log.sha256 and overlap > 0.0:
+                    allowed = "name each log only once, and use another log to check the result"
+                    message = f"{log.source}: has the same bytes as {earlier_log.source}: {allowed}"
+                    raise LogError(message, file=log.source, allowed=allowed)
         log_parts = [(log, *read_records_and_outputs(log, prior, until=until)) for log in motion_logs]
         checked = [] if check_motion is None else read_records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
@@ -222,20 +229,6 @@ def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> 
             raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g} {unit}")
 
 
-def _check_distinct(logs: Sequence[MotionLog]) -> None:
-    """Raise LogError if two logs, including the check log, contain the same rows."""
-    for number, log in enumerate(logs):
-        for earlier_log in logs[:number]:
-            overlap = min(log.span[1], earlier_log.span[1]) - max(log.span[0], earlier_log.span[0])
-            if log.sha256 == earlier_log.sha256 and overlap > 0.0:
-                allowed = "name each log only once, and use another log to check the result"
-                raise LogError(
-                    f"{log.source}: has the same bytes as {earlier_log.source}: {allowed}",
-                    file=log.source,
-                    allowed=allowed,
-                )
-
-
 def read_records_and_outputs(
     log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS, until: float | None = None
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
@@ -255,20 +248,15 @@ def read_records_and_outputs(
     outputs = log_outputs(log, prior)
     if LEFT in outputs:
         return flight_records(log, prior, outputs, min_seconds, end), dict(base_outputs)
-    is_same = base_outputs.keys() == outputs.keys() and all(
-        _is_same_output(base_outputs[name], output) for name, output in outputs.items()
-    )
+    is_same = base_outputs.keys() == outputs.keys()
+    for name in outputs if is_same else ():
+        first, second = base_outputs[name], outputs[name]
+        is_same &= first.output == second.output
+        is_same &= (first.pulse[0], first.pulse[-1]) == (second.pulse[0], second.pulse[-1])
+        # Both outputs move the surface in the same direction.
+        is_same &= (first.value[-1] - first.value[0]) * (second.value[-1] - second.value[0]) > 0.0
     used_outputs = dict(base_outputs) if is_same else outputs
     return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
-
-
-def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
-    """Return True if two servo outputs have the same number, pulse range and direction."""
-    (first_low, *_, first_high), (second_low, *_, second_high) = first.value, second.value
-    has_same_range = (first.pulse[0], first.pulse[-1]) == (second.pulse[0], second.pulse[-1])
-    return (
-        first.output == second.output and has_same_range and (first_high - first_low) * (second_high - second_low) > 0.0
-    )
 
 
 def _report_page(identified: Identified, predicted: PredictedLog, check: str | Path | None, name: str) -> str:

@@ -114,7 +114,14 @@ def flight_records(
         travel = np.where((*log.angles, True), 1.0, stops)
         controls = _hold_samples(log.controls, grid) * (np.array([-1.0, 1.0, -1.0, 1.0]) * travel)
     else:
-        controls = _convert_pulses(servos or log_outputs(log, aircraft), pulses)
+        servo_outputs = servos or log_outputs(log, aircraft)
+        deflections = {name: output.control(pulses[:, output.output - 1]) for name, output in servo_outputs.items()}
+        if LEFT in deflections:
+            # With elevons, elevator and aileron are half the sum and half the difference of the elevons.
+            left, right = deflections.pop(LEFT), deflections.pop(RIGHT)
+            deflections |= {"elevator": 0.5 * (left + right), "aileron": 0.5 * (left - right)}
+        names = ("elevator", "aileron", "rudder", "throttle")
+        controls = np.column_stack([deflections.get(name, np.zeros(len(grid))) for name in names])
     # A surface that is commanded beyond its stop stays at the stop.
     controls = np.clip(controls, -stops, stops)
     height = _interpolate(log.height, grid)[:, 0]
@@ -174,21 +181,6 @@ def _check_duration(
         raise LogError(f"{log.source}: {message}: {allowed}", file=log.source, value=seconds, allowed=allowed)
 
 
-def _convert_pulses(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
-    """Return the controls (n, 4) at the logged pulses: elevator, aileron, rudder (rad) and throttle.
-
-    With elevons, elevator and aileron are half the sum and half the difference of the elevons.
-
-    pulses: pulses of the m servo outputs, (n, m) us.
-    """
-    controls = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
-    if LEFT in controls:
-        left, right = controls.pop(LEFT), controls.pop(RIGHT)
-        controls |= {"elevator": 0.5 * (left + right), "aileron": 0.5 * (left - right)}
-    zeros = np.zeros(len(pulses))
-    return np.column_stack([controls.get(name, zeros) for name in ("elevator", "aileron", "rudder", "throttle")])
-
-
 # Message and quantity of each series, by autopilot.
 _SERIES = {
     "ardupilot": {
@@ -242,7 +234,19 @@ def _check_usable(log: MotionLog) -> None:
     for samples, name in ((log.inertial, "inertial"), (log.surface_commands, "outputs")):
         if len(samples.time) < 2:
             series = " and no ".join(log.missing.get(name, ())) or series_names[name]
-            raise LogError(f"{log.source}: no {series}: {_describe_recording(log)}", file=log.source)
+            # The setting that records the missing series.
+            if log.program_kind == "columns":
+                hint = "expected in [columns] of its table"
+            elif log.program_kind == "telemetry":
+                hint = f"{describe_recording_setting(log)} send them"
+            elif log.program_kind == "px4":
+                setting = describe_recording_setting(log)
+                hint = f"{setting}, the default set at a high rate, records them (PX4 1.14 or later)"
+            else:
+                mask = log.parameters.get("LOG_BITMASK")
+                mask_text = "" if mask is None else f" (the log has {mask:.0f})"
+                hint = f"{describe_recording_setting(log)} records them{mask_text}"
+            raise LogError(f"{log.source}: no {series}: {hint}", file=log.source)
     for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
         if len(samples.time) < 2:
             raise LogError(f"{log.source}: no {series_names[name]}", file=log.source)
@@ -275,18 +279,6 @@ def describe_recording_setting(log: MotionLog) -> str:
     if log.program_kind in _RECORDING_SETTINGS:
         return _RECORDING_SETTINGS[log.program_kind]
     return f"SDLOG_PROFILE {_HIGH_RATE_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_HIGH_RATE_BITMASK}"
-
-
-def _describe_recording(log: MotionLog) -> str:
-    """Return the setting that records a missing series, as the end of an error message."""
-    if log.program_kind == "columns":
-        return "expected in [columns] of its table"
-    if log.program_kind == "telemetry":
-        return f"{describe_recording_setting(log)} send them"
-    if log.program_kind == "px4":
-        return f"{describe_recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
-    mask = log.parameters.get("LOG_BITMASK")
-    return f"{describe_recording_setting(log)} records them{'' if mask is None else f' (the log has {mask:.0f})'}"
 
 
 def _read_servo_functions(log: MotionLog) -> dict[int, int]:

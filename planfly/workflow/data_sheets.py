@@ -118,7 +118,16 @@ def read_aircraft_parameters(file: Path) -> AircraftParameters:
     values: dict[str, float] = {}
     texts: dict[str, str] = {}
     for name in (*_USED_PARAMETERS, "AIRSPEED_STALL"):
-        entry = _px4_value(entries, name) if autopilot == PX4 else _arduplane_value(entries, name)
+        # Value and default in ArduPlane's unit, and text of the parameter; None if it is not in the file.
+        entry: tuple[float, float, str] | None = None
+        if autopilot == PX4:
+            px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
+            if px4_name in entries:
+                default = _PX4_STALL[1] if px4_name == _PX4_STALL[0] else PX4_TABLE.by_name[px4_name].default
+                value = entries[px4_name].value
+                entry = (value / factor, default / factor, f"{px4_name} {value:g}")
+        else:
+            entry = _arduplane_value(entries, name)
         if entry is not None and abs(entry[0] - entry[1]) > 1e-6 * max(1.0, abs(entry[1])):
             values[name], texts[name] = entry[0], entry[2]
     refuse_unknown_parameters(file, autopilot, entries, values)
@@ -139,20 +148,6 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
         return None
     old_name, unit_factor = definition.old
     return entries[old_name].value * unit_factor, definition.default, f"{old_name} {entries[old_name].value:g}"
-
-
-def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return value, default (in ArduPlane's unit) and text of a PX4 parameter; None if not in the file.
-
-    entries: entries of the parameter file, by PX4's names.
-    name: ArduPlane's name of the parameter.
-    """
-    px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
-    if px4_name not in entries:
-        return None
-    default = _PX4_STALL[1] if px4_name == _PX4_STALL[0] else PX4_TABLE.by_name[px4_name].default
-    value = entries[px4_name].value
-    return value / factor, default / factor, f"{px4_name} {value:g}"
 
 
 def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftParameters) -> list[str]:
@@ -237,49 +232,37 @@ def parse_sheet(
             allowed = f"allowed {min_value:g}..{max_value:g} {unit}"
             raise FlightError.of_argument(name, value, allowed, shown=f"{value} {unit}")
         values[name] = value * factor
-    volts, energy = _parse_battery(battery) if battery is not None else (0.0, 0.0)
-    propeller = _parse_propeller(prop) if prop is not None else (0.0, 0.0)
+    volts, watt_hours = 0.0, 0.0
+    if battery is not None:
+        match = _BATTERY_PATTERN.fullmatch(battery.strip())
+        volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+        unit = match[3].lower() if match else ""
+        watt_hours = capacity if unit == "wh" else volts * capacity * (0.001 if unit == "mah" else 1.0)
+        (min_volts, max_volts), (min_energy, max_energy) = _VOLTAGE_RANGE_V, _ENERGY_RANGE_WH
+        if not (min_volts <= volts <= max_volts and min_energy <= watt_hours <= max_energy):
+            allowed = (
+                f"expected volts and capacity, such as 14.8V,5Ah; allowed {min_volts:g}..{max_volts:g}"
+                f" V, {min_energy:g}..{max_energy:g} Wh"
+            )
+            raise FlightError.of_argument("battery", battery, allowed)
+    diameter, pitch = 0.0, 0.0  # inches
+    if prop is not None:
+        match = _PROPELLER_PATTERN.fullmatch(prop.strip())
+        diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+        if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
+            allowed = (
+                "expected diameter and pitch in inches, such as 12x6; allowed: a diameter of"
+                f" {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g}, and a pitch of 0.25 to 1.5 times the diameter"
+            )
+            raise FlightError.of_argument("prop", prop, allowed)
+    propeller = (diameter * _METERS_PER_INCH, pitch * _METERS_PER_INCH)
     layouts: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
     if layout is not None and layout not in list(layouts):
         raise FlightError.of_argument("layout", layout, f"expected {', '.join(layouts)}")
     sheet_values = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
-    return DataSheet(**sheet_values, volts=volts, energy=energy, propeller=propeller, layout=layouts[layout or "tail"])
-
-
-def _parse_battery(text: str) -> tuple[float, float]:
-    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".
-
-    Raises FlightError for invalid text.
-    """
-    match = _BATTERY_PATTERN.fullmatch(text.strip())
-    volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
-    unit = match[3].lower() if match else ""
-    watt_hours = capacity if unit == "wh" else volts * capacity * (0.001 if unit == "mah" else 1.0)
-    if not (
-        _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
-    ):
-        allowed = (
-            f"expected volts and capacity, such as 14.8V,5Ah; allowed {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g}"
-            f" V, {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
-        )
-        raise FlightError.of_argument("battery", text, allowed)
-    return volts, 3600.0 * watt_hours
-
-
-def _parse_propeller(text: str) -> tuple[float, float]:
-    """Return diameter and pitch (m) of a propeller such as "12x6", inches.
-
-    Raises FlightError for invalid text.
-    """
-    match = _PROPELLER_PATTERN.fullmatch(text.strip())
-    diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
-    if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
-        allowed = (
-            "expected diameter and pitch in inches, such as 12x6; allowed: a diameter of"
-            f" {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g}, and a pitch of 0.25 to 1.5 times the diameter"
-        )
-        raise FlightError.of_argument("prop", text, allowed)
-    return diameter * _METERS_PER_INCH, pitch * _METERS_PER_INCH
+    return DataSheet(
+        **sheet_values, volts=volts, energy=3600.0 * watt_hours, propeller=propeller, layout=layouts[layout or "tail"]
+    )
 
 
 def _parse_number(text: str) -> float:

@@ -97,12 +97,19 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not has_plan_heights:
         mission = with_flown_altitudes(mission, flight.lat, flight.lon, flight.up)
-    _check_plan_autopilot(path, mission, flight.raw.program)
+    program = flight.raw.program
+    flown_autopilot = next(
+        (name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), ""
+    )
+    if mission.autopilot and flown_autopilot and mission.autopilot != flown_autopilot:
+        allowed = f"the log {path} is from {program}; `plan` must name the mission that was flown"
+        message = f"{mission.source}: written for {TITLES[mission.autopilot]}, but {allowed}"
+        raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
     scenario, placed = _choose_scenario_and_place_mission(mission, options, plan_scenario)
     scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)
     aircraft_options = (options.get("aircraft"), options.get("scenario"), plan_scenario)
     aircraft_known = any(option is not None for option in aircraft_options)
-    logged_autopilot = autopilot_from_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
+    logged_autopilot = autopilot_from_log(program, flight.raw.parameters, flight.raw.source)
     # A flight by an unknown autopilot is judged with planfly's guidance, which shows what the aircraft can fly.
     autopilot, autopilot_notes = logged_autopilot or (PlanflyGuidance(scenario.flight.steering.guidance), ())
     setup = _flight_setup(scenario, placed, mission, autopilot, flight)
@@ -124,7 +131,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         file=path.name,
         sha256=sha256,
         format=flight.raw.format,
-        program=flight.raw.program,
+        program=program,
         utc_start=flight.raw.utc_start,
         holds=flight.holds,
         stretches=flight.stretches,
@@ -148,17 +155,6 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     if not verdict.complete:
         end_reason = next((found.brief for found in verdict.findings if found.rule == "completion"), "not judged")
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, end_reason)
-
-
-def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
-    """Raise MissionError if the plan was not written for the autopilot of the log."""
-    flown_autopilot = next(
-        (name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), ""
-    )
-    if mission.autopilot and flown_autopilot and mission.autopilot != flown_autopilot:
-        allowed = f"the log {path} is from {program}; `plan` must name the mission that was flown"
-        message = f"{mission.source}: written for {TITLES[mission.autopilot]}, but {allowed}"
-        raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
 def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:

@@ -217,8 +217,28 @@ def make_setup(
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
-    _check_forecast(scenario, route, mission)
-    notes = _setup_notes(scenario, uav, mission, route, autopilot)
+    facts = scenario.wind.forecast
+    if facts is not None:
+        # The route must not leave the area, altitude levels or times of the wind's forecast.
+        file, positions = str(scenario.spec.wind.forecast), route.positions
+        latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
+        check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
+        duration = planned_duration(route, mission)
+        if duration > (facts.last_time - facts.departure).total_seconds():
+            last_text = f"the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC"
+            allowed = f"the flight takes {duration / 60.0:.1f} min, but {last_text}"
+            raise ForecastError.at(file, "time", f"{facts.departure:%Y-%m-%d %H:%M} UTC", allowed)
+    file_parameters, assumed_parameters = (
+        {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
+    )
+    notes = autopilot.checks.parameter_notes
+    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
+    notes += camera_notes(mission, route, scenario.wind, autopilot.speeds.true_airspeed_factor)
+    notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
+    notes += _item_count_notes(mission, autopilot.checks.dialect)
+    envelope, stated_battery = uav.limits.envelope, scenario.flight.battery_wh
+    if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
+        notes += _capacity_notes(autopilot.checks.battery_failsafes, uav.battery, envelope.volts)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
@@ -252,25 +272,6 @@ def planned_duration(route: Route, mission: Mission) -> float:
     return float(leg_times[~is_loiter].sum() + times_at_stops.sum())
 
 
-def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
-    """Raise ForecastError if a route leaves the area, altitude levels or times of the wind's forecast."""
-    facts = scenario.wind.forecast
-    if facts is None:
-        return
-    positions, file = route.positions, str(scenario.spec.wind.forecast)
-    latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
-    check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
-    duration = planned_duration(route, mission)
-    if duration > (facts.last_time - facts.departure).total_seconds():
-        raise ForecastError.at(
-            file,
-            "time",
-            f"{facts.departure:%Y-%m-%d %H:%M} UTC",
-            f"the flight takes {duration / 60.0:.1f} min,"
-            f" but the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
-        )
-
-
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
     """Return the autopilot with an RTL that uses the mission's landing sequence.
 
@@ -281,22 +282,6 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
         return autopilot
     values = autopilot.returns.make_parameters(RtlSettings(lands=True))
     return autopilot.with_parameters("assumed", **values) if values else autopilot
-
-
-def _setup_notes(scenario: Scenario, uav: Uav, mission: Mission, route: Route, autopilot: Autopilot) -> tuple[str, ...]:
-    """Return notes on a mission's flight in a scenario, and on the settings of its autopilot."""
-    file_parameters, assumed_parameters = (
-        {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
-    )
-    notes = autopilot.checks.parameter_notes
-    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
-    notes += camera_notes(mission, route, scenario.wind, autopilot.speeds.true_airspeed_factor)
-    notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
-    notes += _item_count_notes(mission, autopilot.checks.dialect)
-    envelope, stated_battery = uav.limits.envelope, scenario.flight.battery_wh
-    if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
-        notes += _capacity_notes(autopilot.checks.battery_failsafes, uav.battery, envelope.volts)
-    return notes
 
 
 def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts: float) -> tuple[str, ...]:
@@ -411,9 +396,32 @@ def preflight_notes(
                 f"the mission's home is {distance:.0f} m from the scenario's home: after a launch at the scenario's"
                 " home, heights are relative to the scenario's home"
             )
-    notes += _note_misread_altitudes(mission, scenario)
+    # Items whose altitudes fit the terrain only in the other altitude frame.
+    below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
+    amsl, over_home = "altitudes above mean sea level (frame 0)", "heights above home (frame 3)"
+    for readings, stated_as, other in ((below_ground, amsl, over_home), (too_high, over_home, amsl)):
+        if readings:
+            numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
+            notes.append(
+                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as {stated_as},"
+                f" {_heights_text([reading.height for reading in readings])}; read as {other}:"
+                f" {_heights_text([reading.other_height for reading in readings])}. Check the frame"
+            )
     notes += _note_rally_points(return_targets[1:], route, scenario, rules)
-    notes += _note_low_return(return_targets[:1], scenario, rules)
+    # An RTL to home must not end at or below the ground anywhere on its loiter.
+    if return_targets and scenario.terrain is not None and not math.isnan(rules.height):
+        radius, home_point = max(MIN_RTL_LOITER_RADIUS_M, abs(rules.radius)), return_targets[0]
+        angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
+        distances = np.linspace(0.0, radius, _RING_COUNT)[:, None]
+        ground = scenario.terrain.height(
+            home_point.east + distances * np.sin(angles), home_point.north + distances * np.cos(angles)
+        )
+        ground_height = float(np.nanmax(ground, initial=-math.inf)) - home_point.up
+        if ground_height >= rules.height:
+            notes.append(
+                f"an RTL loiters {rules.height:.0f} m above home, but the ground within {radius:.0f} m of home rises to"
+                f" {ground_height:.0f} m above home"
+            )
     # ArduPlane refuses to arm with a landing sequence and RTL_AUTOLAND 0 (AP_Arming.cpp).  An assumed value is noted
     # only without a landing of the scenario, because planfly writes RTL_AUTOLAND for its plan.
     start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
@@ -425,23 +433,6 @@ def preflight_notes(
             " DO_LAND_START, because ArduPlane does not arm with the default 0"
         )
     return (*notes, *_note_landing_ground(mission, route, scenario))
-
-
-def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """Yield notes on items whose altitudes fit the terrain only in the other altitude frame.
-
-    One note is for altitudes AMSL that fit only as heights above home, the other for the opposite.
-    """
-    below_ground, too_high = find_misread_altitudes(mission, scenario.origin, scenario.terrain)
-    amsl, over_home = "altitudes above mean sea level (frame 0)", "heights above home (frame 3)"
-    for readings, stated_as, other in ((below_ground, amsl, over_home), (too_high, over_home, amsl)):
-        if readings:
-            numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
-            yield (
-                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as {stated_as},"
-                f" {_heights_text([reading.height for reading in readings])}; read as {other}:"
-                f" {_heights_text([reading.other_height for reading in readings])}. Check the frame"
-            )
 
 
 def _heights_text(heights: list[float]) -> str:
@@ -487,27 +478,6 @@ def _note_rally_points(
                 f"no RTL flies to {name}, because it is at least {distance / 1000.0:.1f} km from the mission,"
                 f" beyond {limit}"
             )
-
-
-def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Yield a note if an RTL to home would end at or below the ground somewhere on its loiter.
-
-    home_points: home; empty if the mission has no home.
-    """
-    if not home_points or scenario.terrain is None or math.isnan(rules.height):
-        return
-    radius = max(MIN_RTL_LOITER_RADIUS_M, abs(rules.radius))
-    angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
-    distances = np.linspace(0.0, radius, _RING_COUNT)[:, None]
-    ground = scenario.terrain.height(
-        home_points[0].east + distances * np.sin(angles), home_points[0].north + distances * np.cos(angles)
-    )
-    ground_height = float(np.nanmax(ground, initial=-math.inf)) - home_points[0].up
-    if ground_height >= rules.height:
-        yield (
-            f"an RTL loiters {rules.height:.0f} m above home, but the ground within {radius:.0f} m of home rises to"
-            f" {ground_height:.0f} m above home"
-        )
 
 
 # Text for level ground.

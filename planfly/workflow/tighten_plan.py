@@ -90,10 +90,28 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
     if not changes:
         # These limits are tightened only if the flight followed slopes and turns.  A flight that cannot follow its plan
         # is also too low or too close, which is not a separate cause.
-        changes = _raise_clearance(spec, scenario, failed_findings) + _enlarge_missile_spheres(spec, failed_findings)
-        changes += _lower_max_height(spec, scenario, failed_findings) + _widen_zone_margin(
-            spec, scenario, failed_findings
-        )
+        # By how much the flight exceeded each limit, by rule; without zones that the plan itself violates.
+        limits, excesses = scenario.limits, dict[str, list[float]]()
+        for finding in failed_findings:
+            is_planned = finding.rule == "fence" and (finding.planned or 0.0) > ROUNDING_M
+            if finding.margin is not None and not is_planned:
+                excesses.setdefault(finding.rule, []).append(-finding.margin)
+        if "clearance" in excesses:
+            min_clearance = round(limits.min_clearance_m + max(0.0, *excesses["clearance"]) + CLEARANCE_BUFFER_M, 1)
+            _limits_table(spec)["min_clearance_m"] = min_clearance
+            changes.append(Tightening("min_clearance_m", limits.min_clearance_m, min_clearance))
+        changes += _enlarge_missile_spheres(spec, failed_findings)
+        if limits.max_height_m is not None and "height" in excesses:
+            max_height = round(limits.max_height_m - max(0.0, *excesses["height"]) - CLEARANCE_BUFFER_M, 1)
+            if max_height > float(_limits_table(spec).get("min_clearance_m", limits.min_clearance_m)):
+                _limits_table(spec)["max_height_m"] = max_height
+                changes.append(Tightening("max_height_m", limits.max_height_m, max_height))
+        if "fence" in excesses:
+            stated_margin = scenario.planner.zone_margin_m
+            current_margin = CERTIFIED_ZONE_MARGIN_M if stated_margin is None else stated_margin
+            zone_margin = round(current_margin + max(excesses["fence"]) + ZONE_BUFFER_M, 1)
+            spec.setdefault("planner", {})["zone_margin_m"] = zone_margin
+            changes.append(Tightening("zone_margin_m", current_margin, zone_margin))
     if not changes:
         return scenario, []
     return scenario_from_spec(spec, scenario.name, ground=scenario.terrain), changes
@@ -156,60 +174,6 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
         return []
     spec.setdefault("flight", {})["max_bank_deg"] = tightened
     return [Tightening("max_bank_deg", bank, tightened)]
-
-
-def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Raise the minimum clearance in `spec` by the largest shortfall of the flight.
-
-    Return this change in a list.
-
-    Return [] without a failed finding on the clearance; then `spec` is not changed.
-    """
-    shortfalls = [
-        -finding.margin for finding in failed_findings if finding.rule == "clearance" and finding.margin is not None
-    ]
-    if not shortfalls:
-        return []
-    current = scenario.limits.min_clearance_m
-    tightened = round(current + max(0.0, *shortfalls) + CLEARANCE_BUFFER_M, 1)
-    _limits_table(spec)["min_clearance_m"] = tightened
-    return [Tightening("min_clearance_m", current, tightened)]
-
-
-def _lower_max_height(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower.
-
-    Returns this change in a list; [] if nothing is changed.
-    """
-    current = scenario.limits.max_height_m
-    excesses = [
-        -finding.margin for finding in failed_findings if finding.rule == "height" and finding.margin is not None
-    ]
-    if current is None or not excesses:
-        return []
-    tightened = round(current - max(0.0, *excesses) - CLEARANCE_BUFFER_M, 1)
-    if tightened <= float(_limits_table(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
-        return []
-    _limits_table(spec)["max_height_m"] = tightened
-    return [Tightening("max_height_m", current, tightened)]
-
-
-def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not.
-
-    Returns this change in a list; [] if nothing is changed.
-    """
-    flight_violations = [
-        finding for finding in failed_findings if finding.rule == "fence" and not (finding.planned or 0.0) > ROUNDING_M
-    ]
-    depths = [-finding.margin for finding in flight_violations if finding.margin is not None]
-    if not depths:
-        return []
-    scenario_margin = scenario.planner.zone_margin_m
-    current = CERTIFIED_ZONE_MARGIN_M if scenario_margin is None else scenario_margin
-    tightened = round(current + max(depths) + ZONE_BUFFER_M, 1)
-    spec.setdefault("planner", {})["zone_margin_m"] = tightened
-    return [Tightening("zone_margin_m", current, tightened)]
 
 
 def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:

@@ -127,8 +127,20 @@ class FrontSampling:
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[mean_rows]
         is_near, is_in_block, is_noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
-        samples[is_near] += self._draw_near_displacements(mean_rows[is_near])
         rng = self._rng
+        # Displacements from a Gaussian fitted to the solutions nearest to each mean; distances are relative to the size
+        # of the box.
+        near_mean_rows, neighbour_count = mean_rows[is_near], min(NEIGHBOUR_COUNT, len(self.vectors) - 1)
+        scaled_vectors = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
+        # Summed over the first axis: in sequence, with the same rounding on every machine.
+        distances2 = ((scaled_vectors[:, near_mean_rows, None] - scaled_vectors[:, None, :]) ** 2).sum(axis=0)
+        nearest_rows = np.argsort(distances2, axis=1, kind="stable")[:, 1 : neighbour_count + 1]
+        weights = rng.standard_normal((len(near_mean_rows), neighbour_count))
+        weights = DIFFERENCE_FACTOR * weights / np.sqrt(max(1, neighbour_count))
+        displacements = np.zeros((len(near_mean_rows), self._lower.size))
+        for k in range(neighbour_count):
+            displacements += weights[:, k, None] * (self.vectors[nearest_rows[:, k]] - self.vectors[near_mean_rows])
+        samples[is_near] += displacements
         # Each block of neighbouring points moves towards another solution. Blocks may begin before the first point and
         # end after the last, so that each point is equally often in one.
         rows, point_count = mean_rows[is_in_block], self._lower.size // self._axes
@@ -155,28 +167,6 @@ class FrontSampling:
             noise += step_lengths[:, k, None] * self._directions[picked_directions[:, k]]
         samples[is_noisy] += noise
         return np.clip(samples, self._lower, self._upper)
-
-    def _draw_near_displacements(self, mean_rows: Ints) -> Floats:
-        """Draw displacements (n, d) from a Gaussian fitted to the solutions nearest to each mean.
-
-        mean_rows: (n,) rows of the means in the archive.
-
-        Distances between solutions are measured relative to the size of the box.
-        """
-        neighbour_count = min(NEIGHBOUR_COUNT, len(self.vectors) - 1)
-        displacements = np.zeros((len(mean_rows), self._lower.size))
-        scaled_vectors = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
-        # Summed over the first axis: in sequence, with the same rounding on every machine.
-        distances2 = ((scaled_vectors[:, mean_rows, None] - scaled_vectors[:, None, :]) ** 2).sum(axis=0)
-        nearest_rows = np.argsort(distances2, axis=1, kind="stable")[:, 1 : neighbour_count + 1]
-        weights = (
-            DIFFERENCE_FACTOR
-            * self._rng.standard_normal((len(mean_rows), neighbour_count))
-            / np.sqrt(max(1, neighbour_count))
-        )
-        for k in range(neighbour_count):
-            displacements += weights[:, k, None] * (self.vectors[nearest_rows[:, k]] - self.vectors[mean_rows])
-        return displacements
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
         """Insert the best samples into the archive, and adapt the scale of the noise of each kind.

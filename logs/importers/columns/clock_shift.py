@@ -56,13 +56,13 @@ def find_clock_shift(
             start, end = np.searchsorted(grid, (time[0] + shift, time[-1] + shift)).tolist()
             if (end - start) * _GRID_STEP_S >= min_overlap:
                 shifted_values = np.interp(grid[start:end] - shift, time, values)
-                correlation = _correlate(shifted_values, second_values[start:end])
+                correlation = correlate(shifted_values, second_values[start:end])
                 best = max(best, ClockShift(shift, correlation), key=lambda clock_shift: clock_shift.correlation)
     return best
 
 
-def _correlate(values: Floats, other_values: Floats) -> float:
-    """Return the correlation coefficient of two signals; 0 if one of them does not vary."""
+def correlate(values: Floats, other_values: Floats) -> float:
+    """Return the correlation coefficient of two signals of equal length; 0 if one of them does not vary."""
     values, other_values = values - values.mean(), other_values - other_values.mean()
     norm_product = float(np.sqrt((values @ values) * (other_values @ other_values)))
     return float(values @ other_values) / norm_product if norm_product > 0.0 else 0.0

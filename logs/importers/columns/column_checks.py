@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.importers.columns.clock_shift import correlate
 from logs.importers.columns.column_log import ColumnLog, Series
 from world.arrays import Floats
 from world.errors import LogError
@@ -302,13 +303,6 @@ def _fit_wind_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
     return _Triangle(velocity, factor, complex(velocity.mean() - factor * air_velocity.mean()))
 
 
-def _correlate(values: Floats, expected: Floats) -> float:
-    """Return the correlation coefficient of two series of equal length; 0 if one of them is constant."""
-    values, expected = values - values.mean(), expected - expected.mean()
-    norm_product = float(np.sqrt((values @ values) * (expected @ expected)))
-    return float(values @ expected) / norm_product if norm_product > 0.0 else 0.0
-
-
 def _make_contradiction_error(log: ColumnLog, quantity: str, message: str, hint: str) -> LogError:
     """Return the error for a quantity that contradicts the others.
 
@@ -355,7 +349,7 @@ def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     deviations and c the correlation (Frisch 1934).
     """
     values = _average_on_grid(pair.series, grid, wraps=pair.quantity == "yaw")
-    correlation = _correlate(values, pair.expected)
+    correlation = correlate(values, pair.expected)
     if correlation < -_CLEAR_CORRELATION:
         message = f"varies opposite to {pair.partner} (correlation {correlation:.2f})"
         raise _make_contradiction_error(log, pair.quantity, message, "check sign and frame")
@@ -382,7 +376,7 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
         return
     expected, inner_grid = pair.expected[is_inner], grid[is_inner]
     correlations = [
-        _correlate(_average_on_grid(pair.series, inner_grid + shift), expected) for shift in _SHIFTS_S.tolist()
+        correlate(_average_on_grid(pair.series, inner_grid + shift), expected) for shift in _SHIFTS_S.tolist()
     ]
     best, unshifted = max(correlations), correlations[len(correlations) // 2]
     shift = float(_SHIFTS_S[int(np.argmax(correlations))])

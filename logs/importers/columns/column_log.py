@@ -261,7 +261,18 @@ class ColumnLog:
             return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
         values = self._find_column(data, clock.column, f"{field}.column")
         if clock.unit == "iso" or values.dtype.kind == "M":
-            time = _parse_dates(values, self._locate_column(data, clock.column))
+            import pandas as pd
+
+            # Seconds since 1970; a text without a time zone is UTC.
+            is_date = values.dtype.kind == "M"
+            texts = values if is_date else [decode_cell(value) for value in values]
+            try:
+                stamps = pd.to_datetime(texts, utc=True, format=None if is_date else "ISO8601")
+            except (ValueError, TypeError) as error:
+                place, reason = self._locate_column(data, clock.column), str(error).splitlines()[0]
+                message = f"{place}: {reason}: expected dates such as 2026-11-27T10:15:02.5"
+                raise LogError(message, file=place) from None
+            time = np.asarray(stamps.astype("datetime64[ns, UTC]").astype("int64"), np.float64) * 1e-9
         else:
             time = _parse_numbers(values, self._locate_column(data, clock.column)) * UNITS["time"][clock.unit]
         missing_rows = np.flatnonzero(~np.isfinite(time))
@@ -487,19 +498,3 @@ def _parse_numbers(values: Column, place: str) -> Floats:
             except ValueError:
                 raise LogError(f"{place}[{k}]: {text[:40]!r}: expected a number", file=place.split(":")[0]) from None
     return numbers
-
-
-def _parse_dates(values: Column, place: str) -> Floats:
-    """Return dates with times (ISO 8601) as seconds since 1970; a text without a time zone is UTC.
-
-    Raises LogError for a text that is not a date.
-    """
-    import pandas as pd
-
-    texts = values if values.dtype.kind == "M" else [decode_cell(value) for value in values]
-    try:
-        stamps = pd.to_datetime(texts, utc=True, format=None if values.dtype.kind == "M" else "ISO8601")
-    except (ValueError, TypeError) as error:
-        reason = str(error).splitlines()[0]
-        raise LogError(f"{place}: {reason}: expected dates such as 2026-11-27T10:15:02.5", file=place) from None
-    return np.asarray(stamps.astype("datetime64[ns, UTC]").astype("int64"), np.float64) * 1e-9

@@ -80,10 +80,17 @@ def _read_csv(path: Path) -> DataFile:
 
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     lines = text.splitlines()
-    header_index = next(
-        (k for k, line in enumerate(lines) if line.strip() and not _is_remark(line, lines[k + 1 : k + 2])), -1
-    )
-    if header_index < 0:
+    for header_index, line in enumerate(lines):
+        if line.lstrip().startswith(("#", "%")):
+            # A line that begins with # or % is a remark, unless it has as many cells as the next line.
+            separator = max(_SEPARATORS, key=line.count)
+            next_lines = lines[header_index + 1 : header_index + 2]
+            widths = [text.rstrip(f" {separator}").count(separator) for text in (line, *next_lines)]
+            if widths[0] == 0 or widths[0] != widths[-1] or not next_lines:
+                continue
+        if line.strip():
+            break
+    else:
         raise LogError(f"{path}: holds no rows; expected columns of numbers", file=path)
     header = lines[header_index].lstrip("#% ")
     separator = max(_SEPARATORS, key=header.count)
@@ -124,18 +131,6 @@ def _read_csv(path: Path) -> DataFile:
     options = {"header": None, "names": names, "index_col": False, "skipinitialspace": True, "low_memory": False}
     table = pd.read_csv(StringIO(body), sep=separator, decimal=decimal, **options)
     return DataFile(path, {str(name): _convert_numbers(table[name].to_numpy()) for name in table.columns}, units)
-
-
-def _is_remark(line: str, next_lines: list[str]) -> bool:
-    """Return True if a line of a CSV file is a remark, which begins with # or %.
-
-    If such a line has as many cells as the next line, it is the header instead.
-    """
-    if not line.lstrip().startswith(("#", "%")):
-        return False
-    separator = max(_SEPARATORS, key=line.count)
-    widths = [text.rstrip(f" {separator}").count(separator) for text in (line, *next_lines)]
-    return widths[0] == 0 or widths[0] != widths[-1] or not next_lines
 
 
 def _convert_numbers(values: Column) -> Column:

@@ -88,7 +88,17 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     entries += _list_leg_entries(log, parts)
     entries += _list_turn_entries(log, parts)
     entries += _list_clearance_entries(log, parts)
-    entries += _list_threat_entries(log)
+    # Each entry into and exit from the range of a missile or a radar.
+    threats = setup.scenario.threats
+    for k, name in enumerate(threats.names):
+        for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
+            for stay in passages(track.time, track.position, threats.position[k], float(radius)):
+                threat_range = f"the {unit} range of {name}"
+                entries.append(TimelineEntry(stay.start, "threat", f"inside {threat_range} ({float(radius):.0f} m)"))
+                # The track may end inside the range.
+                side = "outside" if stay.whole else "still inside"
+                stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
+                entries.append(TimelineEntry(stay.end, "threat", f"{side} {threat_range}: {stay_text}"))
     # Periods in which the throttle is full or closed.
     throttle = track.commands[:, THROTTLE]
     for name, is_held in (
@@ -232,22 +242,4 @@ def _list_clearance_entries(log: FlightLog, rows_by_leg: list[_LegRows]) -> list
         known_text = "" if np.isfinite(part_clearances).all() else ", where there is terrain data"
         text = f"lowest height on {name}: {clearances[k]:.1f} m above ground{below_text}{known_text}"
         entries.append(TimelineEntry(time, "ground", text))
-    return entries
-
-
-def _list_threat_entries(log: FlightLog) -> list[TimelineEntry]:
-    """List each entry into and exit from the range of a missile or a radar, with duration and closest distance.
-
-    If the track ends inside the sphere, the second entry says so.
-    """
-    threats, track = log.setup.scenario.threats, log.track
-    entries = []
-    for k, name in enumerate(threats.names):
-        for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
-            for stay in passages(track.time, track.position, threats.position[k], float(radius)):
-                place = f"the {unit} range of {name}"
-                entries.append(TimelineEntry(stay.start, "threat", f"inside {place} ({float(radius):.0f} m)"))
-                side = "outside" if stay.whole else "still inside"
-                stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
-                entries.append(TimelineEntry(stay.end, "threat", f"{side} {place}: {stay_text}"))
     return entries
