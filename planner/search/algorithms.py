@@ -55,7 +55,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "fda",
-            "evolutionary search of waypoints, each ranked by the best path through it; needs no seeds and no grids",
+            "evolutionary search of waypoints, each ranked by the best path through it; needs neither initial paths nor grids",
             graded=True,
             final_shortening=True,
             optimiser="waypoints",
@@ -70,7 +70,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "umda-smooth",
-            "UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds",
+            "UMDA in the rotated frame, graded violations, sampled in a smooth basis, without initial paths",
             graded=True,
             smooth=True,
         ),
@@ -84,7 +84,11 @@ ALGORITHMS: dict[str, Algorithm] = {
             optimiser="emna",
         ),
         Algorithm(
-            "emna", "full covariance of all variables (EMNA), no seeds", graded=True, smooth=True, optimiser="emna"
+            "emna",
+            "full covariance of all variables (EMNA), without initial paths",
+            graded=True,
+            smooth=True,
+            optimiser="emna",
         ),
         Algorithm(
             "chain-seeded",
@@ -97,7 +101,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "chain",
-            "each waypoint depends on the one before it (Markov chain), no seeds",
+            "each waypoint depends on the one before it (Markov chain), without initial paths",
             graded=True,
             smooth=True,
             optimiser="chain",
@@ -113,7 +117,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "de",
-            "a classical evolutionary algorithm (differential evolution), no seeds",
+            "a classical evolutionary algorithm (differential evolution), without initial paths",
             graded=True,
             smooth=True,
             optimiser="differential",
@@ -124,7 +128,9 @@ ALGORITHMS: dict[str, Algorithm] = {
             optimiser="differential",
         ),
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
-        Algorithm("umda", "UMDA as in the paper (Yang et al. 2014): rotated frame, violations counted at six points per leg, no first paths"),
+        Algorithm(
+            "umda", "UMDA as in the paper (Yang et al., 2014): rotated frame, six points per leg, without initial paths"
+        ),
         Algorithm("umda-cartesian", "a baseline of the paper: UMDA on Cartesian waypoints", encoding="cartesian"),
         Algorithm(
             "umda-polar",
@@ -142,7 +148,7 @@ def algorithm_lines() -> str:
     """Return the name and the summary of each algorithm, one line per algorithm.
 
     >>> print(algorithm_lines().splitlines()[3])
-      umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
+      umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, without initial paths
     """
     width = max(len(name) for name in ALGORITHMS)
     return "\n".join(f"  {algorithm.name:<{width}}  {algorithm.summary}" for algorithm in ALGORITHMS.values())
