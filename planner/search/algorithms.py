@@ -55,7 +55,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "fda",
-            "evolutionary search of waypoints, each ranked by the best path through it; needs neither initial paths nor grids",
+            "evolutionary search of waypoints, each ranked by the best path through it; without initial paths and grids",
             graded=True,
             final_shortening=True,
             optimiser="waypoints",
