@@ -55,7 +55,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "fda",
-            "evolutionary search of waypoints, each ranked by the best path through it; without initial paths and grids",
+            "evolutionary search of waypoints, each ranked by its best path; without initial paths and grids",
             graded=True,
             final_shortening=True,
             optimiser="waypoints",
