@@ -61,7 +61,8 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
         )
         notes.append(home_text + effect_text)
     limits = setup.autopilot.checks.feasibility
-    if setup.autopilot.checks.dialect == "px4" and not limits.stated and missing_ends_text(setup.mission, limits):
+    is_flown_by_px4 = setup.autopilot.checks.dialect == "px4" and setup.imported_log is None
+    if is_flown_by_px4 and not limits.stated and missing_ends_text(setup.mission, limits):
         notes.append(f"by default (MIS_TKO_LAND_REQ {limits.requires}) PX4 rejects a mission without a landing")
     return tuple(notes)
 

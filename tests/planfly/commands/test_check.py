@@ -328,3 +328,22 @@ def test_an_error_is_a_case_with_the_name_of_the_file_in_junit(
     assert main([*argv, "--junit", "r.xml"]) == 2
     [suite] = ElementTree.parse("r.xml").getroot()
     assert (suite.get("name"), suite.get("errors")) == (name, "1")
+
+
+@pytest.mark.parametrize(("stated", "code"), [(None, 0), (0, 0), (2, 4)])
+def test_the_first_line_says_that_px4_rejects_a_mission_without_a_landing(
+    stated: int | None, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """PX4's default is 2, a landing; a file that does not state the parameter does not fail the mission."""
+    mission, params = tmp_path / "a.waypoints", tmp_path / "a.params"
+    mission.write_text(
+        MISSION.replace("3\t0\t3\t16\t0\t0\t0\t0\t46.01\t8.00\t{up}\t1\n", "").replace("4\t0", "3\t0").format(up=200),
+        encoding="utf-8",
+    )
+    lines = ["1\t1\tNAV_ACC_RAD\t10.0\t9"] + ([] if stated is None else [f"1\t1\tMIS_TKO_LAND_REQ\t{stated}\t6"])
+    params.write_text(
+        "# Onboard parameters for Vehicle 1\n# Stack: PX4 Pro\n" + "\n".join(lines) + "\n", encoding="utf-8"
+    )
+    assert main(["check", str(mission), "--geometry", "--autopilot", "px4", "--params", str(params)]) == code
+    first = capsys.readouterr().out.splitlines()[0]
+    assert ("by default (MIS_TKO_LAND_REQ 2) PX4 rejects a mission without a landing" in first) is (stated is None)
