@@ -182,6 +182,20 @@ def test_a_low_place_of_the_landing_sequence_lowers_what_is_asked_for_only_near_
     assert (into.ok, into.limit) == (False, 20.0)
 
 
+@pytest.mark.parametrize(("distance", "limit"), [(440.0, 12.0), (560.0, 20.0)])
+def test_a_low_place_lowers_what_is_asked_for_within_500_m(distance: float, limit: float) -> None:
+    """A ring of 7 m around a place at 12 m: the aircraft clears it by 18 m, which is enough within 500 m of the place."""
+    low = (MARK, wp(2000, POINT - RUN, 12))
+    lines = landing(p="60 0 0 0")
+
+    def ring(east: Floats, north: Floats) -> Floats:
+        radius = np.hypot(east - 2000.0, north - (POINT - RUN))
+        return np.where(np.abs(radius - distance) < 15.0, 107.0, 100.0)
+
+    found = go_around(ring, lines[0], *low, *lines[1:], **REQUIRED)[0]
+    assert (found.ok, found.limit) == (limit == 12.0, pytest.approx(limit))
+
+
 def test_it_is_aborted_all_along_the_glide_to_the_flare(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[float] = []
     fly = go_around_rule.fly_go_arounds
