@@ -218,7 +218,17 @@ def make_setup(
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
     _check_forecast(scenario, route, mission)
-    notes = _setup_notes(scenario, uav, mission, route, autopilot)
+    file_parameters, assumed_parameters = (
+        {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
+    )
+    notes = autopilot.checks.parameter_notes
+    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
+    notes += camera_notes(mission, route, scenario.wind, autopilot.speeds.true_airspeed_factor)
+    notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
+    notes += _item_count_notes(mission, autopilot.checks.dialect)
+    envelope, stated_battery = uav.limits.envelope, scenario.flight.battery_wh
+    if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
+        notes += _capacity_notes(autopilot.checks.battery_failsafes, uav.battery, envelope.volts)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
@@ -281,22 +291,6 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
         return autopilot
     values = autopilot.returns.make_parameters(RtlSettings(lands=True))
     return autopilot.with_parameters("assumed", **values) if values else autopilot
-
-
-def _setup_notes(scenario: Scenario, uav: Uav, mission: Mission, route: Route, autopilot: Autopilot) -> tuple[str, ...]:
-    """Return notes on a mission's flight in a scenario, and on the settings of its autopilot."""
-    file_parameters, assumed_parameters = (
-        {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
-    )
-    notes = autopilot.checks.parameter_notes
-    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
-    notes += camera_notes(mission, route, scenario.wind, autopilot.speeds.true_airspeed_factor)
-    notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
-    notes += _item_count_notes(mission, autopilot.checks.dialect)
-    envelope, stated_battery = uav.limits.envelope, scenario.flight.battery_wh
-    if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
-        notes += _capacity_notes(autopilot.checks.battery_failsafes, uav.battery, envelope.volts)
-    return notes
 
 
 def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts: float) -> tuple[str, ...]:
