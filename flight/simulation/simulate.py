@@ -721,7 +721,6 @@ class Flight(RunningFlight):
         Raises FlightError if the aircraft cannot be loaded, and StartError if the flight cannot start.
         """
         gains = load_gains(aircraft)
-        self._chosen_engine = engine or setup.engine
         self._ground_phases, gear = setup.ground_phases, None
         self._law = setup.autopilot.model.control_law
         ground_law = setup.autopilot.ground.control_law
@@ -754,7 +753,31 @@ class Flight(RunningFlight):
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(setup, start_motion)
+        # The compiled model flies only if its steps equal those of JSBSim.
+        self._compiled: CompiledModel | None = None
+        if (engine or setup.engine) == "jsbsim":
+            self.engine = "JSBSim, as requested"
+        elif self._law.loop is None:
+            self.engine = f"JSBSim, because the control loop of {setup.autopilot.title} is not compiled"
+        else:
+            has_gusts, has_terrain = self._windy, bool(self._ground.known)
+            try:
+                compiled = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
+            except UnsupportedModel as unsupported:
+                self.engine = f"JSBSim, because the compiled model does not cover {unsupported}"
+            except (FlightError, ArithmeticError) as error:
+                self.engine = f"JSBSim, because the compiled model cannot start: {error}"
+            else:
+                if differences := compiled.find_differences():
+                    # Start again, since the comparison has moved the aircraft.
+                    self.fdm = self._new_fdm()
+                    start_motion()
+                    self.engine = f"JSBSim, because the compiled model differs from it in {differences[0]}"
+                else:
+                    self._compiled = compiled
+                    self.engine = (
+                        f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
+                    )
         self._fly_ticks = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
@@ -778,30 +801,6 @@ class Flight(RunningFlight):
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._law.transfer_state(old_law_record, self._workspace.law_record, setup.route.positions[0])
         self._fly_ticks = self._make_loop()
-
-    def _choose_engine(self, setup: FlightSetup, start_motion: Callable[[], None]) -> tuple[CompiledModel | None, str]:
-        """Choose between the compiled model and JSBSim, by comparing their steps.
-
-        start_motion: function that starts JSBSim again after a comparison that found a difference.
-        Returns the compiled model, or None for JSBSim, and a text that names the choice and its reason.
-        """
-        if self._chosen_engine == "jsbsim":
-            return None, "JSBSim, as requested"
-        if self._law.loop is None:
-            return None, f"JSBSim, because the control loop of {setup.autopilot.title} is not compiled"
-        has_gusts, has_terrain = self._windy, bool(self._ground.known)
-        try:
-            model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
-        except UnsupportedModel as unsupported:
-            return None, f"JSBSim, because the compiled model does not cover {unsupported}"
-        except (FlightError, ArithmeticError) as error:
-            return None, f"JSBSim, because the compiled model cannot start: {error}"
-        if differences := model.find_differences():
-            # Start again, since the comparison has moved the aircraft.
-            self.fdm = self._new_fdm()
-            start_motion()
-            return None, f"JSBSim, because the compiled model differs from it in {differences[0]}"
-        return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 
     def _make_loop(self) -> Callable[[int], int]:
         """Return a function that flies up to a given number of ticks, and returns the flight's end code.
