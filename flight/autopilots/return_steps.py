@@ -1,7 +1,6 @@
 """Steps of a simulated RTL that do not depend on the autopilot, in compiled code: its start, clearances and loiter."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -12,14 +11,13 @@ from flight.autopilots.simulated_returns import (
     RETURN_OFF_TERRAIN,
     RETURN_RESULT,
     RETURN_TIMEOUT,
-    SimulatedReturns,
 )
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_RADIUS_M
 from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord
 from world.geometry import wrap
-from world.kernels import Record, inner, record_dtype
+from world.kernels import Record, Records, inner, record_dtype
 from world.terrain import ground_height
 
 # Lag of the flight path behind the pitch, s: the time in which lift turns the velocity of a small aircraft.
@@ -32,24 +30,15 @@ LOITER_PROGRESS = record_dtype(
 )
 
 
-def simulate_each(
-    timeouts: list[float], fly: Callable[[int, Floats, Record], None], *, store_positions: bool
-) -> SimulatedReturns:
-    """Simulate n RTLs one by one; return their results and, if requested, their tracks.
+def make_return_arrays(timeouts: list[float], *, store_positions: bool) -> tuple[Records, Floats]:
+    """Make the array for the results of n RTLs, and the array for the positions of one RTL.
 
     timeouts: timeout of each RTL, s, (n,).
-    fly: simulates one RTL; the arguments are its number, the array (t, 3) of positions to fill, m, and its result, a
-        `RETURN_RESULT` record to fill.
-    store_positions: True to store the positions.
+    store_positions: False for an array of positions without rows.
+    Returns zeros: (n,) of `RETURN_RESULT`, and (t, 3), m.
     """
-    results = np.zeros(len(timeouts), RETURN_RESULT)
-    positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if store_positions else 0, 3))
-    tracks = []
-    for k in range(len(timeouts)):
-        fly(k, positions, results[k])
-        if store_positions:
-            tracks.append(positions[: int(results[k]["position_count"])].copy())
-    return SimulatedReturns(results, tuple(tracks))
+    position_count = int(max(timeouts, default=0.0)) + 2 if store_positions else 0
+    return np.zeros(len(timeouts), RETURN_RESULT), np.zeros((position_count, 3))
 
 
 @inner

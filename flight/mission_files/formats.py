@@ -5,7 +5,7 @@ ArduPilot's text formats are read and written here: QGC WPL 110 missions, and fe
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
@@ -168,10 +168,26 @@ def parse_mission(text: str, source: str) -> Mission:
     first_text = text.removeprefix("\ufeff").lstrip()
     if first_text[:1] in ("{", "[") or (source.lower().endswith(".plan") and not first_text.startswith("QGC")):
         return parse_plan_file(text, source)
+    line_break_count = max(text.count("\n"), text.count("\r"))
+    if line_break_count > MAX_LINES:
+        raise MissionError(f"{source}: too long: {line_break_count:,} lines; the limit is {MAX_LINES:,}", file=source)
+    lines = [
+        (number, line.strip())
+        for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    _check_lines(lines, source)
     items: list[MissionItem] = []
     locations: list[TextLine] = []
     has_current = False
-    for location, columns in _read_rows(text, source):
+    for number, line in lines[1:]:
+        location, fields = TextLine(source, number), line.split()
+        if len(fields) != len(_COLUMNS):
+            raise MissionError(
+                f"{location}: {count_text(len(fields), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
+                file=location.file,
+            )
+        columns = dict(zip(_COLUMNS, fields, strict=True))
         for name, (min_value, max_value) in _ALLOWED_RANGES.items():
             value = columns[name]
             if not _WHOLE_NUMBER.fullmatch(value) or not min_value <= int(value) <= max_value:
@@ -216,19 +232,11 @@ def parse_mission(text: str, source: str) -> Mission:
     )
 
 
-def _read_rows(text: str, source: str) -> Iterator[tuple[TextLine, dict[str, str]]]:
-    """Yield the location and the columns of each item's line in a WPL 110 text.
+def _check_lines(lines: list[tuple[int, str]], source: str) -> None:
+    """Raise MissionError for a WPL 110 text that is empty, without the header, or with too many items.
 
-    Raises MissionError for a text that is too long or without the header, and for a line without twelve columns.
+    lines: number and content of each line that is neither empty nor a comment.
     """
-    line_break_count = max(text.count("\n"), text.count("\r"))
-    if line_break_count > MAX_LINES:
-        raise MissionError(f"{source}: too long: {line_break_count:,} lines; the limit is {MAX_LINES:,}", file=source)
-    lines = [
-        (number, line.strip())
-        for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
     if not lines:
         raise MissionError(
             f"{source}: empty; expected a first line '{HEADER}' and lines of {len(_COLUMNS)} columns",
@@ -245,14 +253,6 @@ def _read_rows(text: str, source: str) -> Iterator[tuple[TextLine, dict[str, str
         )
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{source}: too long: {len(lines) - 1:,} items; the limit is {MAX_ITEMS:,}", file=source)
-    for number, line in lines[1:]:
-        location, fields = TextLine(source, number), line.split()
-        if len(fields) != len(_COLUMNS):
-            raise MissionError(
-                f"{location}: {count_text(len(fields), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
-                file=location.file,
-            )
-        yield location, dict(zip(_COLUMNS, fields, strict=True))
 
 
 def _value_error(location: TextLine, field: str, value: str | int, value_text: str, allowed: str) -> MissionError:

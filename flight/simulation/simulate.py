@@ -334,6 +334,7 @@ class RunningFlight:
     map: local map from JSBSim's positions, around area and route.
     guidance_memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the simulated aircraft.
+    start: start of the route, with the airspeed limited to the aircraft's range.
     max_ticks: time limit, ticks.
     engine: flight model in use, and the reason for it, as in "JSBSim, as requested".
     _law: control law of a simulated autopilot; None for an external program that starts in the air.
@@ -355,13 +356,14 @@ class RunningFlight:
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
         gear: Gear | None = None,
     ) -> None:
-        """Load the aircraft, and start the flight.
+        """Load the aircraft, and find the start of the route.
 
         local_map: local map of the setup, if another flight has already fitted one.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
         gear: gear for ground contact; None for a flight without ground contact.
+
+        Raises FlightError if the aircraft cannot be loaded, and StartError if the start is not above the terrain.
         """
-        self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
         self._steps = setup.fdm_hz // setup.guidance_hz
         self.dt = self._steps / setup.fdm_hz
@@ -376,6 +378,27 @@ class RunningFlight:
             gear=gear,
         )
         self.fdm = self._new_fdm()
+        points = setup.route.positions
+        east, north, up = (float(value + offset) for value, offset in zip(points[0], start_offset, strict=True))
+        ground_altitude = self._ground.height(east, north)
+        if not math.isnan(ground_altitude) and up <= ground_altitude:
+            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {ground_altitude:.0f} m"
+            raise StartError(setup.mission.source, reason, field="start", value=up)
+        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
+        first_leg = points[1] - points[0]
+        convergence = self.map.convergence(lat, lon)
+        # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed
+        # that the aircraft can hold; the verdict reports it.
+        self.start = Start(
+            lat_deg=lat,
+            lon_deg=lon,
+            amsl=up,
+            course=math.atan2(first_leg[0], first_leg[1]) - convergence,
+            slope=math.atan2(first_leg[2], math.hypot(first_leg[0], first_leg[1])),
+            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(self._airspeeds[0]))),
+            wind=_find_wind(setup, (east, north, up), convergence),
+            ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
+        )
 
     def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Create the workspace of the compiled loop for a route, and set the flight's time limit.
@@ -442,33 +465,6 @@ class RunningFlight:
         self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
         if self._navigation_random is not None:
             start_navigation(self._navigation_random.standard_normal(6), record.navigation)
-
-    def _find_start(self, setup: FlightSetup) -> Start:
-        """Return the start of the route, with the airspeed limited to the aircraft's range.
-
-        Raises StartError if the start is not above the terrain.
-        """
-        points, aircraft = setup.route.positions, self.fdm.aircraft
-        east, north, up = (float(value + offset) for value, offset in zip(points[0], self._start_offset, strict=True))
-        ground_altitude = self._ground.height(east, north)
-        if not math.isnan(ground_altitude) and up <= ground_altitude:
-            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {ground_altitude:.0f} m"
-            raise StartError(setup.mission.source, reason, field="start", value=up)
-        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
-        first_leg = points[1] - points[0]
-        convergence = self.map.convergence(lat, lon)
-        # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed
-        # that the aircraft can hold; the verdict reports it.
-        return Start(
-            lat_deg=lat,
-            lon_deg=lon,
-            amsl=up,
-            course=math.atan2(first_leg[0], first_leg[1]) - convergence,
-            slope=math.atan2(first_leg[2], math.hypot(first_leg[0], first_leg[1])),
-            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(self._airspeeds[0]))),
-            wind=_find_wind(setup, (east, north, up), convergence),
-            ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
-        )
 
     def _start_trimmed(
         self,
@@ -725,7 +721,6 @@ class Flight(RunningFlight):
         Raises FlightError if the aircraft cannot be loaded, and StartError if the flight cannot start.
         """
         gains = load_gains(aircraft)
-        self._chosen_engine = engine or setup.engine
         self._ground_phases, gear = setup.ground_phases, None
         self._law = setup.autopilot.model.control_law
         ground_law = setup.autopilot.ground.control_law
@@ -735,7 +730,7 @@ class Flight(RunningFlight):
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:
             self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
-        start = self._find_start(setup)
+        start = self.start
         if setup.autopilot.speeds.equivalent:
             true_airspeed = start.airspeed * setup.autopilot.speeds.true_airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(aircraft.airspeed_max, true_airspeed))
@@ -758,7 +753,31 @@ class Flight(RunningFlight):
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(setup, start_motion)
+        # The compiled model flies only if its steps equal those of JSBSim.
+        self._compiled: CompiledModel | None = None
+        if (engine or setup.engine) == "jsbsim":
+            self.engine = "JSBSim, as requested"
+        elif self._law.loop is None:
+            self.engine = f"JSBSim, because the control loop of {setup.autopilot.title} is not compiled"
+        else:
+            has_gusts, has_terrain = self._windy, bool(self._ground.known)
+            try:
+                compiled = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
+            except UnsupportedModel as unsupported:
+                self.engine = f"JSBSim, because the compiled model does not cover {unsupported}"
+            except (FlightError, ArithmeticError) as error:
+                self.engine = f"JSBSim, because the compiled model cannot start: {error}"
+            else:
+                if differences := compiled.find_differences():
+                    # Start again, since the comparison has moved the aircraft.
+                    self.fdm = self._new_fdm()
+                    start_motion()
+                    self.engine = f"JSBSim, because the compiled model differs from it in {differences[0]}"
+                else:
+                    self._compiled = compiled
+                    self.engine = (
+                        f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
+                    )
         self._fly_ticks = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
@@ -782,30 +801,6 @@ class Flight(RunningFlight):
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._law.transfer_state(old_law_record, self._workspace.law_record, setup.route.positions[0])
         self._fly_ticks = self._make_loop()
-
-    def _choose_engine(self, setup: FlightSetup, start_motion: Callable[[], None]) -> tuple[CompiledModel | None, str]:
-        """Choose between the compiled model and JSBSim, by comparing their steps.
-
-        start_motion: function that starts JSBSim again after a comparison that found a difference.
-        Returns the compiled model, or None for JSBSim, and a text that names the choice and its reason.
-        """
-        if self._chosen_engine == "jsbsim":
-            return None, "JSBSim, as requested"
-        if self._law.loop is None:
-            return None, f"JSBSim, because the control loop of {setup.autopilot.title} is not compiled"
-        has_gusts, has_terrain = self._windy, bool(self._ground.known)
-        try:
-            model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
-        except UnsupportedModel as unsupported:
-            return None, f"JSBSim, because the compiled model does not cover {unsupported}"
-        except (FlightError, ArithmeticError) as error:
-            return None, f"JSBSim, because the compiled model cannot start: {error}"
-        if differences := model.find_differences():
-            # Start again, since the comparison has moved the aircraft.
-            self.fdm = self._new_fdm()
-            start_motion()
-            return None, f"JSBSim, because the compiled model differs from it in {differences[0]}"
-        return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 
     def _make_loop(self) -> Callable[[int], int]:
         """Return a function that flies up to a given number of ticks, and returns the flight's end code.

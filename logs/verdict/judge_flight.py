@@ -17,12 +17,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import flown_phases, leg_ends
 from logs.verdict.places import Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
-from logs.verdict.rules.registry import (
-    blocking_item_findings,
-    run_rules,
-    with_passing_suggestions,
-    with_suggestions,
-)
+from logs.verdict.rules.registry import blocking_item_findings, run_rules, with_passing_suggestions
 from logs.verdict.summary import failed_at_take_off, headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
@@ -66,13 +61,14 @@ def judge_flight(
     if not len(track):
         return judge_unflown(whole_requirements, end_reason, log_complete=log_complete)
     air_requirements, aligned = flown_phases(whole_requirements, track)
-    findings = run_rules(air_requirements, aligned, end_reason=end_reason, log_complete=log_complete)
+    findings = run_rules(
+        air_requirements, aligned, end_reason=end_reason, log_complete=log_complete, suggests=not findings_only
+    )
     complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not _has_failed(findings)
     if findings_only:
         return Verdict(findings, flyable, complete, (), "flown", unjudged=unjudged)
-    findings = with_suggestions(air_requirements, aligned, findings)
     notes, levels = setup_notes(setup, findings), list[LevelAnswer]()
     if whole_requirements.envelope:
         # The answer by geometry alone, without the flight.

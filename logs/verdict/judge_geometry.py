@@ -12,7 +12,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer
-from logs.verdict.rules.registry import mission_findings, run_rules, with_suggestions
+from logs.verdict.rules.registry import mission_findings, run_rules
 from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from planner.plan import Plan, Violation
@@ -45,7 +45,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     requirements = requirements or route_requirements(setup)
     findings = (
         *mission_findings(setup),
-        *with_suggestions(requirements, aligned=None, findings=run_rules(requirements, None, geometric=True)),
+        *run_rules(requirements, None, geometric=True, suggests=True),
         *([_infeasible_finding(setup.plan)] if setup.plan is not None and setup.plan.failures else []),
     )
     complete = setup.plan is None or not setup.plan.failures
@@ -83,9 +83,9 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     end_finding = make_finding(
         "completion", FLIGHT, ok=False, reason=finding_reason(faults), faults=faults, method="nothing was flown"
     )
-    route_findings = run_rules(requirements, None, geometric=True)
+    route_findings = run_rules(requirements, None, geometric=True, suggests=True)
     passes = not any(finding.ok is False for finding in route_findings)
-    findings = (*with_suggestions(requirements, aligned=None, findings=route_findings), end_finding)
+    findings = (*route_findings, end_finding)
     notes = setup_notes(setup, findings)
     levels = (
         LevelAnswer("geometry", passes, headline(route_findings, passes, notes)),

@@ -217,17 +217,7 @@ def make_setup(
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
-    facts = scenario.wind.forecast
-    if facts is not None:
-        # The route must not leave the area, altitude levels or times of the wind's forecast.
-        file, positions = str(scenario.spec.wind.forecast), route.positions
-        latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
-        check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
-        duration = planned_duration(route, mission)
-        if duration > (facts.last_time - facts.departure).total_seconds():
-            last_text = f"the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC"
-            allowed = f"the flight takes {duration / 60.0:.1f} min, but {last_text}"
-            raise ForecastError.at(file, "time", f"{facts.departure:%Y-%m-%d %H:%M} UTC", allowed)
+    _check_forecast(scenario, route, mission)
     file_parameters, assumed_parameters = (
         {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
     )
@@ -255,6 +245,25 @@ def make_setup(
         fdm_hz=fdm_hz,
         engine=engine,
     )
+
+
+def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
+    """Raise ForecastError if a route leaves the area, altitude levels or times of the wind's forecast."""
+    facts = scenario.wind.forecast
+    if facts is None:
+        return
+    positions, file = route.positions, str(scenario.spec.wind.forecast)
+    latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
+    check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
+    duration = planned_duration(route, mission)
+    if duration > (facts.last_time - facts.departure).total_seconds():
+        raise ForecastError.at(
+            file,
+            "time",
+            f"{facts.departure:%Y-%m-%d %H:%M} UTC",
+            f"the flight takes {duration / 60.0:.1f} min,"
+            f" but the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
+        )
 
 
 def planned_duration(route: Route, mission: Mission) -> float:

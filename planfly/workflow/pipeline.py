@@ -30,7 +30,7 @@ from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
-from planfly.workflow.trial_flight import length_and_duration_text
+from planfly.workflow.trial_flight import predicted_seconds
 from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
 from world.errors import FlightError, PlanflyError, StartError
@@ -214,9 +214,16 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
 def flying_stage(setup: FlightSetup, kind: str = "") -> AbstractContextManager[Advance]:
     """Return the context of the stage in which a setup is flown, which yields a function to report its progress.
 
+    The stage's title states the length and the predicted duration, such as "flying 12.3 km, about 500 s in the air".
+
     kind: common name of stages that take a similar time per km; "" for flights by the setup's autopilot.
     """
-    return stage(f"flying {length_and_duration_text(setup)}", kind or f"flying by {setup.autopilot.name}")
+    seconds = predicted_seconds(setup)
+    time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
+    if seconds >= 2.0 * 3600.0:
+        time = f"{seconds / 3600.0:.1f} h"
+    title = f"flying {setup.path.length / 1000.0:.1f} km, about {time} in the air"
+    return stage(title, kind or f"flying by {setup.autopilot.name}")
 
 
 def fly_and_judge(

@@ -106,12 +106,3 @@ def predicted_seconds(setup: FlightSetup) -> float:
     leg_lengths = leg_runs(setup.route.positions)
     speed = leg_lengths.sum() / (leg_lengths / true_airspeed_route(setup).leg_airspeeds).sum()
     return float(setup.path.length / speed)
-
-
-def length_and_duration_text(setup: FlightSetup) -> str:
-    """Return the length and the predicted duration of a flight, such as "12.3 km, about 500 s in the air"."""
-    seconds = predicted_seconds(setup)
-    time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
-    if seconds >= 2.0 * 3600.0:
-        time = f"{seconds / 3600.0:.1f} h"
-    return f"{setup.path.length / 1000.0:.1f} km, about {time} in the air"

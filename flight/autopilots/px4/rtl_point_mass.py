@@ -27,7 +27,7 @@ from flight.autopilots.return_steps import (
     advance_loiter,
     initialise_outcome,
     initialise_state,
-    simulate_each,
+    make_return_arrays,
     steady_throttle,
     store_position,
     update_clearances,
@@ -103,9 +103,9 @@ def fly_returns(
     ]
     record = parameters.record()
     min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
-
-    def fly(k: int, positions: Floats, result: Record) -> None:
-        """Simulate the RTL from start k, and fill its positions and its result."""
+    results, positions = make_return_arrays(timeouts, store_positions=store_positions)
+    tracks = []
+    for k, timeout in enumerate(timeouts):
         fly_rtl(
             starts[k],
             routes[k],
@@ -117,14 +117,15 @@ def fly_returns(
             environment.spheres,
             environment.radii,
             environment.known,
-            timeouts[k],
+            timeout,
             float(min_clearances[k]),
             float(min_distances[k]),
             positions,
-            result,
+            results[k],
         )
-
-    return simulate_each(timeouts, fly, store_positions=store_positions)
+        if store_positions:
+            tracks.append(positions[: int(results[k]["position_count"])].copy())
+    return SimulatedReturns(results, tuple(tracks))
 
 
 def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) -> Records:

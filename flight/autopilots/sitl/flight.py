@@ -236,7 +236,7 @@ class SitlFlight(ProgramFlight):
         # The aircraft is trimmed on a rail: for a take-off the rail of the launch, or else one that ends before the
         # first waypoint, where the aircraft is released straight and level.
         self._release: Release | None = None
-        start, points, take_off = self._find_start(setup), setup.route.positions, self._ground_phases.take_off
+        start, points, take_off = self.start, setup.route.positions, self._ground_phases.take_off
         if take_off is not None:
             self._start_trimmed(setup.mission.source, start)
             self._release = find_release(setup, self.map, self._ground, self.fdm.aircraft, take_off)

@@ -20,7 +20,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import TriedSuggestions
+from logs.verdict.places import Place, TriedSuggestions
 from logs.verdict.rule import Rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules import (
@@ -111,6 +111,7 @@ def run_rules(
     log_complete: bool = True,
     includes_whole_flight: bool = True,
     flight_findings: Sequence[Finding] | None = None,
+    suggests: bool = False,
 ) -> tuple[Finding, ...]:
     """Return the findings of all rules on a flown track or on a route, after the rules have merged them.
 
@@ -121,6 +122,8 @@ def run_rules(
         each stop; False for only the findings on legs, corners, threats and zones.
     flight_findings: findings on a flight of a route that is judged by its geometry.  Findings of rules with
         `Rule.is_same_for_plan` are copied from them; None to run these rules, too.
+    suggests: True to add ``suggestions`` to the failed or undecided findings that a change could fix.  If they are more
+        than `MAX_SUGGESTED_FINDINGS`, no finding gets any.
     """
     findings: list[Finding] = []
     for rule in RULES.values():
@@ -140,7 +143,16 @@ def run_rules(
             merged = rule.merge(requirements, aligned, merged)
     if includes_whole_flight:
         merged = (*worst_finding_per_stop(merged), *_other_side_findings(requirements, merged))
-    return merged if geometric else (*blocking_item_findings(requirements.setup), *merged)
+    merged = merged if geometric else (*blocking_item_findings(requirements.setup), *merged)
+    if not suggests:
+        return merged
+    return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
+    places = [k for k, finding in enumerate(merged) if _needs_suggestions(finding, return_legs)]
+    results = list(merged)
+    for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():
+        if (suggest := RULES[results[k].rule].suggest) is not None:
+            results[k] = replace(results[k], suggestions=suggest(requirements, aligned, results[k]))
+    return tuple(results)
 
 
 # Rules that judge the aircraft's position, which depends on the side to which it turns at a course reversal.
@@ -208,34 +220,22 @@ def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 MAX_SUGGESTED_FINDINGS = 200
 
 
-def with_suggestions(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
-) -> tuple[Finding, ...]:
-    """Add ``suggestions`` to the failed or undecided findings that a change could fix.
+def _needs_suggestions(finding: Finding, return_legs: set[Place]) -> bool:
+    """Return True for a finding that gets suggestions: a failed or undecided one that a change could fix.
 
     On the legs of a return to launch only findings on clearance get suggestions: the autopilot chooses the path of a
     return, and the mission and a parameter decide only its start and its altitude.
-    If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
+
+    return_legs: legs of the route's return to launch.
     """
-    return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
-
-    def is_open(finding: Finding) -> bool:
-        """Return True for an undecided finding on the aircraft or on home's altitude, which a change decides."""
-        is_on_home = finding.rule == "clearance" and finding.check == GROUND_PATH
-        return finding.ok is None and (finding.check == UNKNOWN_AIRCRAFT or is_on_home)
-
-    places = [
-        k
-        for k, finding in enumerate(findings)
-        if (finding.ok is False or is_open(finding))
+    # A change decides an undecided finding on the aircraft or on home's altitude.
+    is_on_home = finding.rule == "clearance" and finding.check == GROUND_PATH
+    is_open = finding.ok is None and (finding.check == UNKNOWN_AIRCRAFT or is_on_home)
+    return (
+        (finding.ok is False or is_open)
         and RULES[finding.rule].suggest is not None
         and (finding.place not in return_legs or finding.rule == "clearance")
-    ]
-    results = list(findings)
-    for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():
-        if (suggest := RULES[results[k].rule].suggest) is not None:
-            results[k] = replace(results[k], suggestions=suggest(requirements, aligned, results[k]))
-    return tuple(results)
+    )
 
 
 def with_passing_suggestions(

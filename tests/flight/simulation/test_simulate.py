@@ -438,7 +438,7 @@ def airborne(points: object, **keywords: object) -> Gliding:
 def test_a_route_starts_at_its_first_waypoint_on_its_first_leg() -> None:
     points = [[0.0, 0.0, 500.0], [1000.0, 1000.0, 600.0]]
     setup = MAKE(points, wind=(6.0, 270.0))
-    start = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._find_start(setup)
+    start = Gliding(setup, AEROSONDE, load_gains(AEROSONDE)).start
     assert (start.amsl, start.ground, start.airspeed) == (500.0, 100.0, 25.0)
     assert start.course == pytest.approx(math.pi / 4.0, abs=1e-6)
     assert start.slope == pytest.approx(math.atan2(100.0, math.hypot(1000.0, 1000.0)))
@@ -451,7 +451,7 @@ def test_a_start_in_the_ground_is_refused() -> None:
     low = setup.route.positions - [0.0, 0.0, 51.0]
     setup = replace(setup, route=setup.route.with_fields(position=low))
     with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
-        Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._find_start(setup)
+        Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
 
 
 def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> None:

@@ -1,5 +1,6 @@
 """A flight cannot run away: its simulated time and its log have limits, and what it comes to is told before."""
 
+import contextlib
 import dataclasses
 import math
 from pathlib import Path
@@ -12,9 +13,10 @@ from flight.simulation.setup import FlightSetup
 from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
+from planfly.runtime.stages import Advance, Receiver, send_progress_to
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.pipeline import fly_and_judge
-from planfly.workflow.trial_flight import length_and_duration_text, predicted_seconds
+from planfly.workflow.pipeline import fly_and_judge, flying_stage
+from planfly.workflow.trial_flight import predicted_seconds
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.test_interruptions import LONG
 from tests.synthetic import make_setup
@@ -63,11 +65,13 @@ def test_a_log_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> No
 def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its predicted time is that of the flight, within a twentieth."""
     opened = opened_calm(long)
-    told = length_and_duration_text(opened)
+    told = told_of(opened)
     flown = fly_and_judge(opened)
     assert flown.ended == "completed"
     assert predicted_seconds(opened) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
-    assert told == f"{opened.path.length / 1e3:.1f} km, about {predicted_seconds(opened) / 60:.0f} min in the air"
+    assert (
+        told == f"flying {opened.path.length / 1e3:.1f} km, about {predicted_seconds(opened) / 60:.0f} min in the air"
+    )
 
 
 def test_energy_ends_a_flight(long: Path) -> None:
@@ -88,8 +92,21 @@ def opened_calm(path: Path) -> FlightSetup:
     return open_flight(path, {"scenario": "field.toml", "guidance": "path", "wind": (0.0, 0.0), "turbulence": "none"})
 
 
+def told_of(setup: FlightSetup) -> str:
+    """The title of the stage in which it is flown."""
+    titles: list[str] = []
+
+    def begin(title: str, _kind: str) -> contextlib.AbstractContextManager[Advance]:
+        titles.append(title)
+        return contextlib.nullcontext(lambda *_: None)
+
+    with send_progress_to(Receiver(begin, titles.append)), flying_stage(setup):
+        (title,) = titles
+        return title
+
+
 def test_a_short_flight_is_told_in_seconds() -> None:
-    assert length_and_duration_text(example_log().setup).endswith(" s in the air")
+    assert told_of(example_log().setup).endswith(" s in the air")
 
 
 def test_a_speed_that_the_autopilot_ignores_lengthens_no_predicted_flight() -> None:

@@ -184,7 +184,7 @@ def test_a_low_place_of_the_landing_sequence_lowers_what_is_asked_for_only_near_
 
 @pytest.mark.parametrize(("distance", "limit"), [(440.0, 12.0), (560.0, 20.0)])
 def test_a_low_place_lowers_what_is_asked_for_within_500_m(distance: float, limit: float) -> None:
-    """A ring of 7 m around a place at 12 m: the aircraft clears it by 18 m, which is enough within 500 m of the place."""
+    """A ring of 7 m around a place at 12 m: the aircraft clears it by 18 m, which is enough within 500 m of it."""
     low = (MARK, wp(2000, POINT - RUN, 12))
     lines = landing(p="60 0 0 0")
 
