@@ -24,7 +24,7 @@ class HiddenPackage(NamedTuple):
 def find_hidden_package(home: Path) -> HiddenPackage | None:
     """Find a module that Python would import in place of a package of planfly, without importing it.
 
-    Return None if there is none.
+    Return None if no module hides a package.
 
     home: the folder of planfly and its packages.
 

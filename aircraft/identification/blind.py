@@ -121,7 +121,7 @@ class Band:
 
 
 def uninformative_note(bands: Sequence[Band]) -> str:
-    """Return a sentence about the quantities whose bands are not informative; "" if there are none."""
+    """Return a sentence about the quantities whose bands are not informative; "" without any."""
     names = ", ".join(band.name for band in bands if not band.is_informative)
     return f"the model does not predict {names}: the band is at least as wide as without a model" if names else ""
 

@@ -113,7 +113,7 @@ class Parameters(Protocol):
 
     @property
     def source(self) -> str:
-        """The user's file; "" if there is none."""
+        """The user's file; "" without one."""
 
     @property
     def outside_documented_ranges(self) -> tuple[str, ...]:

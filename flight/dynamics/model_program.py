@@ -454,7 +454,7 @@ def _check_element(element: Element, *, attributes: Iterable[str] = (), children
 
 
 def _element_text(element: Element) -> str:
-    """Return the text of an element without surrounding blanks; "" if there is none."""
+    """Return the text of an element without surrounding blanks; "" without one."""
     return (element.text or "").strip()
 
 

@@ -312,7 +312,7 @@ def steady_flight(
 def full_throttle_climb(
     simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None
 ) -> Trim | None:
-    """Return the steady climb at full throttle, or None if there is none.
+    """Return the steady climb at full throttle, or None without one.
 
     simulator: JSBSim instance with the aircraft.
     airspeed: m/s.

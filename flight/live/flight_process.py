@@ -295,7 +295,7 @@ class _RequestQueue:
         return self._queued.popleft() if self._queued else self._connection.recv()
 
     def poll(self) -> object:
-        """Return the next request, or None if there is none; EndFlight(quit=True) if the link has closed."""
+        """Return the next request, or None without one; EndFlight(quit=True) if the link has closed."""
         if not self._queued and not self._connection.poll():
             return None
         try:

@@ -99,7 +99,7 @@ def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[s
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """Describe the findings that leave the verdict undecided; return "" if there are none.
+    """Describe the findings that leave the verdict undecided; return "" without any.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place

@@ -367,7 +367,7 @@ def _join_with_and(texts: Sequence[str]) -> str:
 
 
 def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
-    """Join alternative suggestions into one instruction; return "" if there are none.
+    """Join alternative suggestions into one instruction; return "" without any.
 
     >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s")
     >>> suggestions_text(((Change("length", Place("leg", 1), 300.0, 400.0, "m"),), (slower,)))

@@ -95,7 +95,7 @@ def ground_risk(
 def _write_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:
     """Write volumes, map, table and page of a result into a folder, and return the result with the files.
 
-    command: command line that repeats the search; "" if there is none.
+    command: command line that repeats the search; "" without one.
     """
     # Imported here: only pictures need matplotlib.
     from logs.views.drawing import png_bytes

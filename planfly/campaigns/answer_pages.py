@@ -18,7 +18,7 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
     """Return the page of a take-off window: the chart, and a table of all departures.
 
     figure: chart of the departures.
-    command: command line that repeats the search; "" if there is none.
+    command: command line that repeats the search; "" without one.
     """
     local = result.goal.zone
     zones = (UTC,) if local.utcoffset(None) == timedelta(0) else (UTC, local)
@@ -59,7 +59,7 @@ def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerP
     The end of the mission or a return decides the capacity in the flights in which it needs the most energy.
 
     figure: chart of the capacities.
-    command: command line that repeats the search; "" if there is none.
+    command: command line that repeats the search; "" without one.
     """
     goal = result.goal
     return AnswerPage(
@@ -97,7 +97,7 @@ def ground_risk_page(result: GroundRiskResult, figure: Figure, command: str) -> 
     """Return the page of a ground risk: the map of the volumes, and the table for an application.
 
     figure: map of the volumes.
-    command: command line that repeats the search; "" if there is none.
+    command: command line that repeats the search; "" without one.
     """
     rows = [
         [Markup("<strong>{}</strong>").format(cell.strip("*")) if cell.startswith("**") else cell for cell in row]

@@ -94,7 +94,7 @@ class DaskPool:
 
         A flight whose worker died `MAX_WORKER_DEATHS` times is yielded as lost.
 
-        next_request: returns the next request, or None if there is none at present; called again after each flight.
+        next_request: returns the next request, or None while no request is ready; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
         """
         flying: dict[tuple[str, int], FlightRequest] = {}

@@ -84,7 +84,7 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
 def failure_lines(by_rule: Iterable[RuleFailures], mission_fault: str = "") -> list[str]:
     """Return a line for each failed rule: number of failed flights, and the three most frequent places.
 
-    mission_fault: text for failures of the mission as a whole, which have no place; "" if there is none.
+    mission_fault: text for failures of the mission as a whole, which have no place; "" without one.
     by_rule: failures by rule and place.
     """
     lines = []

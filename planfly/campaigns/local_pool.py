@@ -118,7 +118,7 @@ class LocalPool:
     def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
         """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order.
 
-        next_request: returns the next request, or None if there is none at present; called again after each flight.
+        next_request: returns the next request, or None while no request is ready; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if no process can be started.
         """
         idle_workers = list(self._workers)

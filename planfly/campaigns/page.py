@@ -44,7 +44,7 @@ class AnswerPage:
     lines: answer, then its conditions.
     figures: each figure with its caption.
     explanation: paragraphs below the tables.
-    command: command line that repeats the answer; "" if there is none.
+    command: command line that repeats the answer; "" without one.
     """
 
     command_name: str

@@ -500,7 +500,7 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
     if winds.is_only_calm or all(winds.estimated):
         return []
     texts: list[str | None] = []
-    # Strongest wind without a failure up to it, and weakest wind with a failure; None if there is none.
+    # Strongest wind without a failure up to it, and weakest wind with a failure; None without one.
     for is_estimated, (flyable, failed) in zip(winds.estimated, winds.flown_bounds, strict=True):
         if is_estimated:
             texts.append(None)

@@ -465,7 +465,7 @@ class Store(LockedTable):
         ]
 
     def first_text(self, name: str) -> str | None:
-        """Return the first text in a column that is not empty, in the order of flights; None if there is none."""
+        """Return the first text in a column that is not empty, in the order of flights; None without one."""
         query = f"SELECT {_check_column(name)} FROM flights WHERE {name} IS NOT NULL ORDER BY flight LIMIT 1"
         row = self._connection.execute(query).fetchone()
         return None if row is None else str(row[0])

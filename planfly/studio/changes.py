@@ -33,7 +33,7 @@ class PlaceResult(NamedTuple):
     """Result of a rule at a place.
 
     ok: True if the place passes the rule, False if it fails, None if it was not judged.
-    value, margin: value and margin in ``unit``, or None if there are none.
+    value, margin: value and margin in ``unit``, or None without any.
     cause: reason of a failure whose value is within the limit and so does not show it; "" otherwise.
     place: description of the place, with the item numbers of its own mission.
     scale: smallest noticeable difference of the margin.

@@ -94,7 +94,7 @@ class Session:
     undone_states: states of the documents whose opening was undone.
     replaced_settings: autosaved settings of this document that were not restored, each as text.
     must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
-    unused_text: text on autosaved edits that were set aside because the mission file has changed; "" if there are none.
+    unused_text: text on autosaved edits that were set aside because the mission file has changed; "" without any.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
     named_parameters: [flight] entries of each autopilot that was flown with a parameter file, by its name; they apply
     again when this autopilot is chosen again.
@@ -209,7 +209,7 @@ class Session:
 
     @property
     def file_kind(self) -> str:
-        """Format of the file that saving the mission may overwrite; "" if there is none."""
+        """Format of the file that saving the mission may overwrite; "" without one."""
         return self.document.kind if self.document.path is not None else ""
 
     @property

@@ -534,7 +534,7 @@ def _find_route(
     expected_cost: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid that keeps away from earlier routes; None if there is none.
+    """Return the cheapest route over a grid that keeps away from earlier routes; None without one.
 
     earlier_routes: routes near which a path costs more.
     expected_cost: upper limit on the cost with which the search is tried first; the second search has no limit.

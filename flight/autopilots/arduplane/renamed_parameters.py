@@ -81,7 +81,7 @@ def name_in_release(name: str, version: ArduPlaneVersion) -> str:
 
 
 def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPlaneVersion) -> str:
-    """Describe in one line the parameters that a release names differently; "" if there are none.
+    """Describe in one line the parameters that a release names differently; "" without any.
 
     used: names that the control law reads. Of the other names, only the first is mentioned.
 

@@ -23,7 +23,7 @@ _TEMPORARY_PREFIXES = ("px4_lock-", "px4-sock-")
 
 
 def startup_files(program: Path) -> Path | None:
-    """Return the folder of a program's start-up files, or None if there is none."""
+    """Return the folder of a program's start-up files, or None without one."""
     folder = program.resolve().parent
     candidates = (folder / STARTUP, folder.parent / STARTUP)
     return next((candidate for candidate in candidates if (candidate / _STARTUP_SCRIPT).is_file()), None)

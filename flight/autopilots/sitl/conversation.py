@@ -158,7 +158,7 @@ class Conversation:
         return _Stopwatch(self._now, self._clock)
 
     def _last_status_text(self) -> str:
-        """Return the last status text of the autopilot as the end of a message; "" if there is none."""
+        """Return the last status text of the autopilot as the end of a message; "" without one."""
         return f"; its last message: {self._reported.texts[-1]}" if self._reported.texts else ""
 
     def _send_heartbeat(self) -> None:

@@ -154,7 +154,7 @@ class AutopilotProcess:
     def end(self, answer_request: Callable[[], bool]) -> None:
         """Ask the program to end, so that it closes its log; kill it if it has not ended after `_GRACE_S`.
 
-        answer_request: function that answers one physics request of the program; returns False if there is none.
+        answer_request: function that answers one physics request of the program; returns False without one.
         """
         if self._signal(signal.SIGTERM):
             deadline = time.monotonic() + _GRACE_S

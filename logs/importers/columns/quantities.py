@@ -143,7 +143,7 @@ def to_default_frame(quantity: str, frame: str) -> tuple[float, float]:
 
 
 def find_likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
-    """Return another unit in which numbers of a quantity would be plausible, or "" if there is none.
+    """Return another unit in which numbers of a quantity would be plausible, or "" without one.
 
     magnitude: typical number in the data, which was read as a value in ``unit``.
 

@@ -44,7 +44,7 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs flown in a stretch of the log that follows the mission; return None if there are none.
+    """Find the legs flown in a stretch of the log that follows the mission; return None without any.
 
     A stretch has no legs if it passed fewer than two waypoints, or has fewer than two rows.  The first leg starts at
     the first waypoint that was passed.  The last leg ends at the last waypoint that was passed; if the log continues

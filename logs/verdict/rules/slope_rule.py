@@ -278,7 +278,7 @@ class _SteepGround(NamedTuple):
 
 
 def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
-    """Return the ground that rises too steeply for a leg to follow it; None if there is none.
+    """Return the ground that rises too steeply for a leg to follow it; None without one.
 
     Ground is also ignored if the height that the aircraft misses is negligible.  After a flight, the measured height
     error decides, and the autopilot's climb rate limits the slope, too.  Falling ground is no fault, because the
