@@ -90,7 +90,7 @@ def lattice_without_routes(searches: list[LatticeCall], expanded: int) -> Callab
 def test_a_lattice_that_memory_makes_the_same_is_searched_once(
     scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, states: int | None, searched: int
 ) -> None:
-    """Where no route turns back, a lattice of smaller steps is tried; with few states allowed it is no finer."""
+    """A lattice of smaller steps is tried if no route turns back; with few states allowed it is no finer."""
     if states is not None:
         monkeypatch.setattr(lattice_module, "MAX_LATTICE_STATES", states)
     searches: list[LatticeCall] = []
