@@ -1,6 +1,12 @@
-"""Phrase numbers in messages."""
+"""Phrase numbers in messages and tables."""
 
+import math
 from collections.abc import Sequence
+
+# Text of a missing value in a table.
+NOTHING = "–"
+# Texts of units that are shown in another form.
+_UNIT_TEXTS = {"deg": "°", "none": "", "1": ""}
 
 
 def count_text(count: int, noun: str) -> str:
@@ -40,3 +46,40 @@ def is_one_edit(first: str, second: str) -> bool:
     if not (first + second).replace("_", "").isalpha():
         return False
     return max(len(first), len(second)) == 1 or (len(first) == 2 and first == second[::-1])
+
+
+def format_number(value: float | None, *, signed: bool = False, digits: int | None = None) -> str:
+    """Return a number as text with three or four significant digits.
+
+    None and non-finite values become an en dash.
+
+    digits: number of decimals, for columns in which all numbers need the same number.
+    """
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    magnitude = abs(value)
+    if digits is None:
+        digits = 0 if magnitude >= 1000 else 1 if magnitude >= 10 else 2
+        if 5e-5 < magnitude < 0.1:
+            digits = 4 if magnitude < 0.01 else 3
+    text = f"{value:{'+' if signed else ''},.{digits}f}"
+    if not any(character in "123456789" for character in text):
+        text = text.lstrip("+-")
+    # A thousands comma could be read as a decimal comma; a thin space cannot.
+    return text.replace(",", "\u2009").replace("-", "−")
+
+
+def format_quantity(value: float | None, unit: str) -> str:
+    """Return a number and its unit as text, with radians shown as degrees."""
+    shown_value, name = display_value(value, unit)
+    text = format_number(shown_value)
+    if text == NOTHING or not name:
+        return text
+    return f"{text}{name}" if name in ("°", "%") else f"{text}\u00a0{name}"
+
+
+def display_value(value: float | None, unit: str) -> tuple[float | None, str]:
+    """Return a value and its unit for display: radians become degrees, and a value of None stays None."""
+    if unit == "rad":
+        return (None if value is None else math.degrees(value)), "°"
+    return value, _UNIT_TEXTS.get(unit, unit)

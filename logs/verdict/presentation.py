@@ -1,20 +1,28 @@
-"""Define how findings are shown: their signs and words, and their order by rule.
+"""Define how findings are shown: their signs, words and numbers, and their order by rule.
 
-Every output reads them here and in `logs.verdict.verdict.Verdict`, and only lays them out: terminal, report page,
-notebook, studio, JUnit and ground stations.
+A verdict has four renderings, which read their texts here and in `logs.verdict.verdict.Verdict`: the document
+(``verdict.json``, and the list of the studio), lines of text (terminal), tables of HTML (report and notebook), and
+JUnit XML.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from logs.verdict.findings import Finding, State, closest_to_limit, undecided_findings, worst_first_key
 from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP, Margin, RuleWords
 from logs.verdict.wording import noun_with_place, quantity_text
+from world.wording import NOTHING, display_value, format_number, format_quantity
 
 # Signs of states, for readers who see no color.
 STATE_SIGNS: dict[State, str] = {"ok": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
 # Words of states of findings.
 STATE_WORDS: dict[State, str] = {"ok": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
+# Columns of a table of results, filled by `RuleFindings.cells`.
+RESULT_COLUMNS = ("rule", "result", "findings", "place", "planned", "flown", "limit", "margin", "unit")
+# Largest number of decimals with which a value is distinguished from its limit.
+_MAX_DECIMALS = 6
 # Texts of the overlap of a survey's photos.  It is shown apart from the photo lines, because it is no share of a line.
 _OVERLAP_WORDS = replace(
     RULE_WORDS["survey"],
@@ -60,6 +68,103 @@ def limit_with_tolerance_text(finding: Finding) -> str:
         f" {'less' if finding.at_least else 'plus'}"
         f" {f'{tolerance_text} for {purpose}' if purpose else f'a tolerance of {tolerance_text}'}"
     )
+
+
+def short_text(finding: Finding, *, with_tolerance: bool = False) -> str:
+    """Return a finding in a few words: its rule, and its value and limit if it passes, otherwise its brief reason.
+
+    with_tolerance: True to state the tolerance apart from the limit.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> numbers = {"planned": 13.5, "limit": 14.2, "margin": 0.7, "unit": "deg"}
+    >>> short_text(make_finding("slope", Place("leg", 1), ok=True, reason="", **numbers))
+    'slope 13.5° (≤ 14.2°)'
+    """
+    word = finding_words(finding).word
+    if not finding.ok:
+        return f"{word}: {finding.brief or finding.reason}"
+    value, limit_text = finding.compared_texts()
+    if finding.limit is not None and (with_tolerance or finding.tolerance_note):
+        limit_text = limit_with_tolerance_text(finding)
+    return f"{word} {value}" + (f" ({limit_text})" if limit_text else "")
+
+
+class NumberTexts(NamedTuple):
+    """Numbers of a finding as texts for a table, in the given unit; a missing number is an en dash."""
+
+    planned: str = NOTHING
+    flown: str = NOTHING
+    limit: str = NOTHING
+    margin: str = NOTHING
+    unit: str = ""
+
+
+def number_texts(finding: Finding) -> NumberTexts:
+    """Return the numbers of a finding as texts, with enough digits to tell the value from its limit.
+
+    The limit includes the tolerance, unless `Finding.tolerance_note` states it.  The margin is the distance from the
+    shown limit.
+    """
+    planned, flown, margin, tolerance, value, limit = (
+        display_value(number, finding.unit)[0]
+        for number in (
+            finding.planned,
+            finding.flown,
+            finding.margin,
+            0.0 if finding.tolerance_note else finding.tolerance,
+            finding.value,
+            finding.shown_limit,
+        )
+    )
+    digits = None
+    if value is not None and limit is not None and value != limit and format_number(value) == format_number(limit):
+        sufficient_decimals = (
+            decimals
+            for decimals in range(_MAX_DECIMALS)
+            if format_number(value, digits=decimals) != format_number(limit, digits=decimals)
+        )
+        digits = next(sufficient_decimals, _MAX_DECIMALS)
+    limit_text = format_number(limit, digits=digits)
+    return NumberTexts(
+        planned=format_number(planned, digits=digits),
+        flown=format_number(flown, digits=digits),
+        limit=limit_text if limit_text == NOTHING else f"{finding.limit_sign}\u00a0{limit_text}",
+        margin=format_number(None if margin is None else margin + (tolerance or 0.0), signed=True),
+        unit=display_value(value=None, unit=finding.unit)[1],
+    )
+
+
+def missed_text(finding: Finding) -> str:
+    """State by how much a failed finding misses its limit, with the unit; "" if the finding has no limit."""
+    if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
+        return ""
+    distance = -finding.margin - (finding.tolerance or 0.0)
+    # A count has no decimals.
+    return quantity_text(distance, finding.unit) if finding.unit == "legs" else format_quantity(distance, finding.unit)
+
+
+def method_text(finding: Finding) -> str:
+    """Return the method of a finding, with its limit and its tolerance."""
+    if not finding.tolerance or not finding.method or finding.limit is None:
+        return finding.method
+    limit, tolerance = (format_quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
+    return f"{finding.method}; limit {limit} with a tolerance of {tolerance}"
+
+
+def state_text(state: State) -> str:
+    """Return a state as its sign and its word."""
+    return f"{STATE_SIGNS[state]} {STATE_WORDS[state]}"
+
+
+def count_sentence(findings: Sequence[Finding]) -> str:
+    """Return a sentence on the numbers of findings that pass, fail, and were not judged."""
+    counts = Counter(finding.state for finding in findings)
+    passed_text = f"{counts['ok']} of {counts['ok'] + counts['fail']} judged findings pass"
+    failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
+    unjudged = counts["open"] + counts["unjudged"]
+    unjudged_text = f"; {unjudged} could not be judged" if unjudged else ""
+    return f"{passed_text}{failed_text}{unjudged_text}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +225,23 @@ class RuleFindings:
         judged_text = f"{failed_count} of {self.judged} fail" if failed_count else f"{self.judged} ok"
         parts = [judged_text if self.judged else "", f"{unjudged_count} not judged" if unjudged_count else ""]
         return ", ".join(filter(None, parts))
+
+    @property
+    def failure_heading(self) -> str:
+        """Rule and place of its worst failed finding, with the number of failed findings if there are several."""
+        worst_finding = self.failed[0]
+        if len(self.failed) == 1:
+            return finding_heading(worst_finding)
+        return (
+            f"{self.words.word}: {len(self.failed)} of {self.judged} places fail; the worst is at {worst_finding.where}"
+        )
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Row of the rule in a table with `RESULT_COLUMNS`; a rule that was not judged has its reason as place."""
+        place = self.shown.where if self.shown else "" if self.judged else self.findings[0].reason
+        numbers = number_texts(self.shown) if self.shown else NumberTexts()
+        return (self.words.word, state_text(self.state), self.tally_text, place, *numbers)
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:

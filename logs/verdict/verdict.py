@@ -17,7 +17,13 @@ from logs.verdict.document import (
 from logs.verdict.findings import APART_FROM_FLIGHT, Finding, State, closest_to_limit, undecided_findings
 from logs.verdict.junit import JunitSuite, suites_text, verdict_suite
 from logs.verdict.places import DecidingParameter, LevelAnswer
-from logs.verdict.presentation import STATE_SIGNS, RuleFindings, findings_by_rule
+from logs.verdict.presentation import (
+    RESULT_COLUMNS,
+    STATE_SIGNS,
+    RuleFindings,
+    findings_by_rule,
+    number_texts,
+)
 from logs.verdict.wording import text_after
 from world.extras import require_extra
 from world.html_table import html_table
@@ -294,16 +300,15 @@ class Verdict:
         return suites_text([self.junit_suite(name)])
 
     def _repr_html_(self) -> str:
-        """Return the verdict as a table for a notebook, with a row for each rule and for each failed finding."""
+        """Return the verdict as a table for a notebook: rows for each failed finding, and for each rule that passes."""
         rows: list[tuple[str, ...]] = []
         for rule in self.rules:
-            rows.append((rule.words.title, rule.count_text, "", ""))
+            word, state, tally, *_ = rule.cells
             rows += [
-                ("", finding.where, finding.reason, finding.suggestion)
-                for finding in rule.findings
-                if finding.state == "fail"
-            ]
-        return html_table(self.headline, rows, ("rule", "result", "reason", "would pass"))
+                (word, state, tally, finding.where, *number_texts(finding), finding.reason, self.remedy_text(finding))
+                for finding in rule.failed
+            ] or [(*rule.cells, "", "")]
+        return html_table(self.headline, rows, (*RESULT_COLUMNS, "reason", "would pass"))
 
 
 def verdict_json(verdict: Verdict) -> str:

@@ -12,7 +12,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.violated_legs import legs_near_missiles, violated_legs
-from logs.verdict.presentation import finding_words, limit_with_tolerance_text
+from logs.verdict.presentation import short_text
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import quantity_text
 
@@ -113,20 +113,16 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
     >>> finding_state(slope)
     State(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
     """
-    word = finding_words(finding).word
     if finding.ok is None:
-        return State("open", 0.0, f"{word}: {finding.brief or finding.reason}") if unjudged else None
+        return State("open", 0.0, short_text(finding)) if unjudged else None
     if finding.ok is False:
-        return State("fail", -math.inf if finding.margin is None else finding.margin, f"{word}: {finding.brief}")
+        return State("fail", -math.inf if finding.margin is None else finding.margin, short_text(finding))
     if finding.margin is None or finding.planned is None:
         return None
     closeness = _closeness(finding)
-    value, limit_text = finding.compared_texts()
-    # A value beyond the limit but within the tolerance: the text names the tolerance and its purpose.
-    is_only_tolerated = closeness < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
-    if finding.limit is not None and (is_only_tolerated or finding.tolerance_note):
-        limit_text = limit_with_tolerance_text(finding)
-    text = f"{word} {value}" + (f" ({limit_text})" if limit_text else "")
+    # The tolerance and its purpose are stated if the value is near its limit only without the tolerance.
+    with_tolerance = closeness < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
+    text = short_text(finding, with_tolerance=with_tolerance)
     return State("near" if closeness < 1.0 else "ok", closeness, text)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +13,7 @@ from flight.mission.edits import movable_indices
 from flight.mission.items import AMSL, OVER_HOME, Command, Mission, MissionItem, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
+from logs.verdict.document import finding_document
 from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.places import Suggestion, TriedSuggestions
 from logs.verdict.presentation import finding_words
@@ -281,7 +282,7 @@ def verdict_page_data(verdict: Verdict) -> Json:
 
 
 def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[Json]:
-    """Return page data of the findings to list.
+    """Return page data of the findings to list, each as in ``verdict.json``, with its number, title and offers.
 
     These are the failed and undecided findings, then the finding closest to its limit for each rule.
 
@@ -290,15 +291,11 @@ def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[J
     verdict = replace(verdict, findings=with_passing_suggestions(verdict.findings, tried))
     return [
         {
+            **asdict(finding_document(finding)),
             "number": number,
-            "rule": finding_words(finding).title,
+            "title": finding_words(finding).title,
             "state": finding.state,
-            "ok": finding.ok,
-            "where": finding.where,
-            "kind": finding.place.kind,
-            "index": finding.place.index,
-            "text": finding.reason,
-            "suggestions": [
+            "offers": [
                 {"text": suggestion_text(suggestion), "apply": can_apply_in_studio(suggestion)}
                 for suggestion in finding.suggestions
             ],

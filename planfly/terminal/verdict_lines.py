@@ -42,13 +42,7 @@ def verdict_lines(
     for rule in verdict.failed_rules:
         # The worst finding, its suggestion or else that of another finding, and the other failed places.
         worst_finding, *other_findings = rule.failed
-        place_text = finding_heading(worst_finding)
-        if other_findings:
-            place_text = (
-                f"{rule.words.word}: {len(rule.failed)} of {rule.judged} places fail; the worst is at"
-                f" {worst_finding.where}"
-            )
-        lines.append(colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}")
+        lines.append(colour_text("  failed  ", "bad") + f"{rule.failure_heading}: {worst_finding.reason}")
         if worst_finding.suggestions:
             lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
         elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):

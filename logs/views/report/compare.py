@@ -34,12 +34,13 @@ from logs.views.report.page import (
     script_text,
     style_text,
 )
-from logs.views.report.text import NOTHING, format_columns, number
+from logs.views.report.text import format_columns
 from logs.views.scene import SceneView, script_json
 from world.arrays import Floats
 from world.files import write_atomically
 from world.geometry import path_length
 from world.html_table import html_table
+from world.wording import NOTHING, format_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,8 +195,8 @@ def _list_difference_notes(first: FlightLog, second: FlightLog, names: tuple[str
         if len(first_positions) and len(second_positions):
             distances = measure_nearest_distances(second_positions, first_positions)
             notes.append(
-                f"tracks: {number(float(distances.mean()))} m apart on average,"
-                f" {number(float(distances.max()))} m at most"
+                f"tracks: {format_number(float(distances.mean()))} m apart on average,"
+                f" {format_number(float(distances.max()))} m at most"
             )
     else:
         notes.append("map origins differ: the distance between the tracks is not computed")
@@ -253,8 +254,8 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]
     for difference in comparison.differences:
         digits = None if difference.unit else 0
-        change = number(difference.second - difference.first, signed=True, digits=digits)
-        values = (number(value, digits=digits) for value in (difference.first, difference.second))
+        change = format_number(difference.second - difference.first, signed=True, digits=digits)
+        values = (format_number(value, digits=digits) for value in (difference.first, difference.second))
         rows.append((difference.name, difference.unit, *values, change))
     return rows
 

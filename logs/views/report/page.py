@@ -23,6 +23,15 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
 from logs.verdict.measures.track_alignment import with_legs
+from logs.verdict.presentation import (
+    RESULT_COLUMNS,
+    count_sentence,
+    finding_words,
+    method_text,
+    missed_text,
+    number_texts,
+    state_text,
+)
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
 from logs.views import figures
@@ -31,7 +40,6 @@ from logs.views.failures import failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, make_subject, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
-from logs.views.report.text import count_sentence, finding_rows, missed_text, rule_row
 from logs.views.scene import script_json
 from world.files import write_atomically
 
@@ -41,6 +49,8 @@ if TYPE_CHECKING:
 
 # Pictures.
 
+# Order in which the page lists findings by their state.
+STATE_ORDER = ("fail", "open", "ok", "unjudged")
 # Size of a PNG above which the picture is embedded as a JPEG, bytes.
 _LARGE_PICTURE_BYTES = 200_000
 
@@ -284,12 +294,19 @@ def _render_page(
     return page_template("report.html").render(
         name=setup.scenario.name,
         verdict=verdict,
-        missed_text=missed_text,
+        texts={
+            "method": method_text,
+            "missed": missed_text,
+            "numbers": number_texts,
+            "state": state_text,
+            "words": finding_words,
+        },
         flown=track is not None,
         counts=count_sentence(verdict.findings),
         flight_line=tables.flight_sentence(setup, track),
-        rules=[rule_row(rule) for rule in verdict.rules if rule.state != "fail"],
-        findings=finding_rows(verdict.findings),
+        result_columns=RESULT_COLUMNS,
+        rules=[rule for rule in verdict.rules if rule.state != "fail"],
+        findings=sorted(verdict.findings, key=lambda finding: STATE_ORDER.index(finding.state)),
         notes=[
             note
             for note in tables.mission_notes(setup)

@@ -14,12 +14,11 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track, control_limits, saturated_rows
 from logs.verdict.measures.path_sweeps import passages, segment_clearances
 from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
-from logs.views.report.text import NOTHING, number, quantity
 from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import lat_lon_of_points
-from world.wording import count_text
+from world.wording import NOTHING, count_text, format_number, format_quantity
 
 if TYPE_CHECKING:
     from logs.recording.reader import LogEvent
@@ -72,14 +71,14 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
         turn = NOTHING
         if leg < len(turns):
             direction = "right" if turns[leg] > 0.0 else "left"
-            turn = f"{number(abs(float(turns[leg])), digits=1)} {direction}" if abs(turns[leg]) >= 0.05 else "0"
+            turn = f"{format_number(abs(float(turns[leg])), digits=1)} {direction}" if abs(turns[leg]) >= 0.05 else "0"
         planned_cells = (
             f"{numbers[leg]}",
-            number(float(runs[leg]), digits=0),
+            format_number(float(runs[leg]), digits=0),
             f"{round(float(courses[leg]), 1) % 360.0:05.1f}",
-            number(float(slopes[leg]), signed=True, digits=2),
-            number(float(waypoints[leg, 2]), digits=1),
-            number(float(waypoints[leg + 1, 2]), digits=1),
+            format_number(float(slopes[leg]), signed=True, digits=2),
+            format_number(float(waypoints[leg, 2]), digits=1),
+            format_number(float(waypoints[leg + 1, 2]), digits=1),
             turn,
         )
         flown_cells: tuple[str, ...] = (NOTHING,) * 7
@@ -90,13 +89,13 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
             roll = track.attitude[leg_track_rows, ROLL]
             lowest = None if heights_above_ground is None else _find_min_finite(heights_above_ground[leg_track_rows])
             flown_cells = (
-                number(float(track.time[last] - track.time[first]), digits=1),
-                number(float(np.mean(track.airspeed[leg_track_rows], dtype=np.float64)), digits=1),
-                number(math.degrees(_find_max_magnitude(roll)), digits=1),
-                number(_find_max_magnitude(track.cross_track[leg_track_rows]), digits=2),
-                number(_find_max_magnitude(track.height_error[leg_track_rows]), digits=2),
-                number(lowest, digits=1),
-                number(float(track.energy[last]) - float(track.energy[first]), digits=2),
+                format_number(float(track.time[last] - track.time[first]), digits=1),
+                format_number(float(np.mean(track.airspeed[leg_track_rows], dtype=np.float64)), digits=1),
+                format_number(math.degrees(_find_max_magnitude(roll)), digits=1),
+                format_number(_find_max_magnitude(track.cross_track[leg_track_rows]), digits=2),
+                format_number(_find_max_magnitude(track.height_error[leg_track_rows]), digits=2),
+                format_number(lowest, digits=1),
+                format_number(float(track.energy[last]) - float(track.energy[first]), digits=2),
             )
         rows.append(LegRow(planned_cells + flown_cells, leg in failing))
     return rows
@@ -125,7 +124,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     lowest_text = (
         NOTHING
         if heights_above_ground is None
-        else number(_find_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
+        else format_number(_find_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
     )
     phase_text = ""
     if is_ground_phase.any():
@@ -138,11 +137,11 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     energy_used = float(track.energy[-1])
     # An imported log may contain no battery data.
     energy_text = (
-        f", {number(energy_used, digits=0)} of {number(setup.battery, digits=0)} Wh"
+        f", {format_number(energy_used, digits=0)} of {format_number(setup.battery, digits=0)} Wh"
         if math.isfinite(energy_used)
         else ""
     )
-    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height_text}{energy_text}."
+    return f"Flown: {format_number(distance, digits=1)} km in {format_number(seconds, digits=0)} s{height_text}{energy_text}."
 
 
 def _find_max_magnitude(values: NDArray[np.float32]) -> float:
@@ -167,23 +166,27 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     east, north = (float(np.ptp(axis_range)) / 1000.0 for axis_range in scenario.bounds)
     facts.append(("Map origin", _format_position(scenario.origin.lat_deg, scenario.origin.lon_deg)))
     area = scenario.spec.area
-    floor_text = f"from {number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
+    floor_text = f"from {format_number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
     if not scenario.external:
         facts += [
-            ("Area", f"{number(east)} km east–west, {number(north)} km north–south"),
-            ("Heights allowed", f"{floor_text}up to {number(scenario.ceiling)} m AMSL"),
+            ("Area", f"{format_number(east)} km east–west, {format_number(north)} km north–south"),
+            ("Heights allowed", f"{floor_text}up to {format_number(scenario.ceiling)} m AMSL"),
         ]
     for name, point in (("Start", scenario.start), ("Destination", scenario.destination)):
         lat, lon = lat_lon_of_points(scenario, point)
-        facts.append((name, f"{_format_position(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
+        facts.append(
+            (name, f"{_format_position(float(lat), float(lon))}, {format_quantity(float(point[2]), 'm')} AMSL")
+        )
     if terrain is None:
         facts.append(("Terrain", "none was given, so the ground is not judged"))
     else:
         error_text = (
-            f", stated error {quantity(terrain.vertical_error, 'm')}" if terrain.vertical_error is not None else ""
+            f", stated error {format_quantity(terrain.vertical_error, 'm')}"
+            if terrain.vertical_error is not None
+            else ""
         )
         facts.append(
-            ("Terrain", f"{terrain.source}, every {quantity(terrain.spacing, 'm')}; {terrain.datum}{error_text}")
+            ("Terrain", f"{terrain.source}, every {format_quantity(terrain.spacing, 'm')}; {terrain.datum}{error_text}")
         )
     missile_count = int(np.count_nonzero(scenario.threats.kill_radius > 0.0))
     radar_count = int(np.count_nonzero(scenario.threats.detection_radius > 0.0))
@@ -193,17 +196,17 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     limits, wind = scenario.limits, scenario.wind
     # A limit on an angle that the scenario states as text is the aircraft's limit.
     max_turn, max_climb, max_dive = (
-        "the aircraft's" if isinstance(limit, str) else quantity(limit, "deg")
+        "the aircraft's" if isinstance(limit, str) else format_quantity(limit, "deg")
         for limit in (limits.max_turn_deg, limits.max_climb_deg, limits.max_dive_deg)
     )
     limits_text = (
-        f"turn {max_turn}, climb {max_climb}, dive {max_dive}; {quantity(limits.min_clearance_m, 'm')} above ground; "
-        f"within {quantity(setup.corridor, 'm')} of the legs"
+        f"turn {max_turn}, climb {max_climb}, dive {max_dive}; {format_quantity(limits.min_clearance_m, 'm')} above ground; "
+        f"within {format_quantity(setup.corridor, 'm')} of the legs"
     )
-    wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
+    wind_text = f"{format_quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
     if wind.gradient:
-        gradient_text = number(100.0 * wind.gradient, signed=True)
-        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gradient_text} m/s per 100 m of height"
+        gradient_text = format_number(100.0 * wind.gradient, signed=True)
+        wind_text += f" at {format_quantity(wind.reference_amsl, 'm')} AMSL, {gradient_text} m/s per 100 m of height"
     if wind.forecast is not None:
         wind_text = f"{wind.forecast.describe()}; mean profile {wind_text}"
     facts += [
@@ -225,13 +228,16 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
     braking_text = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
     route = setup.route
     facts: Facts = [
-        ("Aircraft", f"{setup.aircraft}, at {quantity(setup.airspeed, 'm/s')}, bank up to {quantity(bank, 'rad')}"),
+        (
+            "Aircraft",
+            f"{setup.aircraft}, at {format_quantity(setup.airspeed, 'm/s')}, bank up to {format_quantity(bank, 'rad')}",
+        ),
         ("Descent", f"the propeller {braking_text}"),
         (
             "Mission",
             f"{setup.mission.source}: {count_text(len(setup.mission.items), 'item')}, {count_text(route.legs, 'leg')}",
         ),
-        ("Route", f"{quantity(float(path_length(route.positions)) / 1000.0, 'km')} long"),
+        ("Route", f"{format_quantity(float(path_length(route.positions)) / 1000.0, 'km')} long"),
     ]
     if setup.plan is not None:
         plan = setup.plan
@@ -251,7 +257,7 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
 
 def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
     """List the first `MAX_EVENTS` events as time (s), text and level."""
-    return [(number(event.time, digits=2), event.text, event.level) for event in events[:MAX_EVENTS]]
+    return [(format_number(event.time, digits=2), event.text, event.level) for event in events[:MAX_EVENTS]]
 
 
 def mission_notes(setup: FlightSetup) -> list[str]:
@@ -274,15 +280,15 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
     facts: Facts = [
         (
             "Left",
-            f"{quantity(setup.battery - used_energy, 'Wh')},"
-            f" {quantity(100.0 * (1.0 - used_energy / setup.battery), '%')}",
+            f"{format_quantity(setup.battery - used_energy, 'Wh')},"
+            f" {format_quantity(100.0 * (1.0 - used_energy / setup.battery), '%')}",
         ),
-        ("Peak current", quantity(_find_max_magnitude(track.current), "A")),
+        ("Peak current", format_quantity(_find_max_magnitude(track.current), "A")),
     ]
     if seconds > 0.0:
-        facts.append(("Mean power", quantity(used_energy * 3600.0 / seconds, "W")))
+        facts.append(("Mean power", format_quantity(used_energy * 3600.0 / seconds, "W")))
     if distance > 0.0:
-        facts.append(("Per kilometre", quantity(used_energy / distance, "Wh")))
+        facts.append(("Per kilometre", format_quantity(used_energy / distance, "Wh")))
     return facts
 
 
@@ -322,11 +328,11 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
         (
             name,
             unit,
-            number(stay.start, digits=1),
-            number(stay.end, digits=1) if stay.whole else "still inside",
-            number(stay.end - stay.start, digits=1),
-            number(stay.closest, digits=0),
-            number(radius, digits=0),
+            format_number(stay.start, digits=1),
+            format_number(stay.end, digits=1) if stay.whole else "still inside",
+            format_number(stay.end - stay.start, digits=1),
+            format_number(stay.closest, digits=0),
+            format_number(radius, digits=0),
         )
         for stay, name, unit, radius in sorted(stays, key=lambda entry: entry[0].start)
     ]
@@ -345,15 +351,15 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
         min_command = 0.0 if name == "throttle" else -limit
         saturation_time = float(durations[saturated_rows(track, k, min_command, limit)].sum())
         scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
-        peak_text = number(scale * _find_max_magnitude(command), digits=1)
-        limit_text = number(scale * limit, digits=1)
+        peak_text = format_number(scale * _find_max_magnitude(command), digits=1)
+        limit_text = format_number(scale * limit, digits=1)
         rows.append(
             (
                 name,
                 limit_text if limit_text == NOTHING else limit_text + unit,
                 peak_text + unit,
-                number(saturation_time, digits=1) if math.isfinite(limit) else NOTHING,
-                number(100.0 * saturation_time / max(float(durations.sum()), 1e-9), digits=1)
+                format_number(saturation_time, digits=1) if math.isfinite(limit) else NOTHING,
+                format_number(100.0 * saturation_time / max(float(durations.sum()), 1e-9), digits=1)
                 if math.isfinite(limit)
                 else NOTHING,
             )

@@ -152,11 +152,11 @@ export class Panel {
     }
     // A place that the flight has judged, too, is listed only there; one that it did not reach with the changes of the geometry.
     const isFlown = flight && !stale, flownFailed = isFlown ? flight.findings.filter((one) => one.ok !== true) : [];
-    const same = (one) => (other) => other.rule === one.rule && other.where === one.where;
+    const same = (one) => (other) => other.title === one.title && other.where === one.where;
     const failed = now.findings.filter((one) => one.ok !== true && !flownFailed.some(same(one)));
     if (failed.length) box.append(element("h2", {}, titleOf(failed, "")), element("ul", { class: "findings" }, ...failed.map((one) => this.finding(one, false, isFlown && one))));
     if (flownFailed.length) {
-      const planned = (one) => one.ok === null && !one.suggestions.length && now.findings.find((other) => other.ok !== true && same(one)(other));
+      const planned = (one) => one.ok === null && !one.offers.length && now.findings.find((other) => other.ok !== true && same(one)(other));
       const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
       box.append(element("h2", {}, titleOf(flownFailed, " in flight")), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed.map((one) => this.finding(one, true, planned(one)))));
     }
@@ -190,14 +190,14 @@ export class Panel {
 
   // planned: the same finding by geometry, if its changes are offered.
   finding(one, flown, planned) {
-    const { rev } = this.now, from = planned || one, suggestions = from.suggestions.map((each, which) => element("li", {},
+    const { rev } = this.now, from = planned || one, offers = from.offers.map((each, which) => element("li", {},
       each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: from.number, which, flown: flown && !planned }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
       element("span", {}, planned && each.apply ? `${each.text} (${this.flight.early ? "not tried in flight, because the flight ended before it" : "by geometry, not flown"})` : each.text)));
-    const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
-    const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
+    const whole = ["flight", "mission", "plan"].includes(one.place.kind) && !/\d/.test(one.where);
+    const place = whole ? "" : one.place.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
     return element("li", { "data-state": one.state },
-      element("p", {}, element("span", { class: "rule" }, one.rule), " ", place), element("p", { class: "reason" }, one.text),
-      suggestions.length ? element("ul", { class: "suggestions" }, ...suggestions) : null);
+      element("p", {}, element("span", { class: "rule" }, one.title), " ", place), element("p", { class: "reason" }, one.reason),
+      offers.length ? element("ul", { class: "suggestions" }, ...offers) : null);
   }
 
   // ---- waypoints

@@ -534,17 +534,17 @@ const app = {
   complain,
   save: () => panel.save(),
   now,
-  goTo(finding) {
+  goTo({ place }) {
     const { model } = now;
     let points = [];
-    if (finding.kind === "leg" && model.path[finding.index]) points = triplets(model.path[finding.index]);
-    else if (finding.kind === "waypoint" && model.route[finding.index]) {
-      points = [model.route[finding.index]];
-      if (model.of[finding.index] >= 0) app.select(model.of[finding.index], true);
-    } else if (["missile", "radar"].includes(finding.kind)) {
-      const one = now.world.threats[finding.index], r = one.kill || one.detection;
+    if (place.kind === "leg" && model.path[place.index]) points = triplets(model.path[place.index]);
+    else if (place.kind === "waypoint" && model.route[place.index]) {
+      points = [model.route[place.index]];
+      if (model.of[place.index] >= 0) app.select(model.of[place.index], true);
+    } else if (["missile", "radar"].includes(place.kind)) {
+      const one = now.world.threats[place.index], r = one.kill || one.detection;
       points = [[one.at[0] - r, one.at[1] - r], [one.at[0] + r, one.at[1] + r]];
-    } else if (["exclusion", "inclusion"].includes(finding.kind)) points = now.world.zones[finding.index].rings[0];
+    } else if (["exclusion", "inclusion"].includes(place.kind)) points = now.world.zones[place.index].rings[0];
     if (!points.length) return;
     const [east, north] = map.extentOf(points), rim = Math.max(400, 0.7 * Math.max(east[1] - east[0], north[1] - north[0]));
     map.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]]);

@@ -34,7 +34,6 @@ from logs.verdict.reference_attachment import parse_reference_flights, reference
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import place_text, suggestions_text
-from logs.views.report.text import rule_row
 from planfly.campaigns.flight_row import find_minimum_margins
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
@@ -270,8 +269,8 @@ def test_a_failed_finding_is_closest_to_its_limit_everywhere(
     if margin is not None:
         assert ("furthest beyond its limit at" if margin < 0.0 else "closest to its limit at") in line
         assert f"at leg {leg}" in line
-    (row,) = map(rule_row, findings_by_rule(findings))
-    assert row.where == ("" if leg is None else f"leg {leg}")
+    (rule,) = findings_by_rule(findings)
+    assert rule.cells[3] == ("" if leg is None else f"leg {leg}")
     assert [(rule, least.value) for rule, least in find_minimum_margins(tuple(findings))] == (
         [] if margin is None else [("slope", margin)]
     )
@@ -295,12 +294,12 @@ def test_a_finding_that_passes_beyond_its_tolerance_passes_by_other_evidence(mar
 def test_a_rule_with_a_finding_left_open_is_not_called_ok_in_the_report() -> None:
     passed = make_finding("slope", Place("leg", 0), ok=True, reason="", margin=1.0, unit="deg")
     unsure = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
-    assert [row.state for row in map(rule_row, findings_by_rule([passed]))] == ["ok"]
-    (row,) = map(rule_row, findings_by_rule([passed, unsure]))
+    assert [rule.state for rule in findings_by_rule([passed])] == ["ok"]
+    (row,) = findings_by_rule([passed, unsure])
     # The row names the leg that is open, not the one that passes.
-    assert (row.state, row.counts, row.where) == ("open", "1 ok, 1 not judged", "leg 1")
+    assert (row.state, *row.cells[2:4]) == ("open", "1 ok, 1 not judged", "leg 1")
     failed = make_finding("slope", Place("leg", 2), ok=False, reason="too steep")
-    assert [row.where for row in map(rule_row, findings_by_rule([passed, unsure, failed]))] == ["leg 2"]
+    assert [rule.cells[3] for rule in findings_by_rule([passed, unsure, failed])] == ["leg 2"]
 
 
 def made_verdict() -> Verdict:

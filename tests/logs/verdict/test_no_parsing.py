@@ -17,7 +17,6 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
-from logs.views.report.text import rule_row
 from logs.views.turns import list_place_values
 from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
@@ -63,7 +62,7 @@ def data_of(verdict: Verdict) -> dict[str, Any]:
 def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     """What figures, report and the next round of planning take from a verdict, without words."""
     shown = verdict
-    rows = [(row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in map(rule_row, shown.rules)]
+    rows = [(rule.state, *rule.cells[:3], *(rule.cells[k] for k in (4, 5, 7))) for rule in shown.rules]
     tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [list_place_values(verdict.findings, rule) for rule in RULES]
     return [

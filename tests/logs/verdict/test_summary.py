@@ -175,9 +175,8 @@ def test_a_notebook_shows_each_rule_and_what_fails_of_it() -> None:
     page = ElementTree.fromstring(VERDICT._repr_html_())
     rows = [[cell.text or "" for cell in row] for row in page.find("table/tbody") or ()]
     assert rows == [
-        ["turns", "1 of 2 ok", "", ""],
-        ["", "waypoint 1", "turns 90° <of 60°>", ""],
-        ["clearance", "not judged", "", ""],
+        ["turn", "✗ fails", "1 of 2 fail", "waypoint 1", "90.0", "–", "≤\u00a060.0", "–", "", "turns 90° <of 60°>", ""],
+        ["clearance", "– not judged", "1 not judged", "no terrain", "–", "–", "–", "–", "", "", ""],
     ]
     assert page.findtext("strong") == "not flyable: turn"
 

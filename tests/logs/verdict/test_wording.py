@@ -12,10 +12,10 @@ from logs.verdict.document import finding_document
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Place
+from logs.verdict.presentation import number_texts
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import change_text, place_text, shorten_statement, suggestion_text, suggestions_text
-from logs.views.report.text import finding_rows
 from planfly.studio.states import finding_state
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import leg, missile, of, suggested, waypoint
@@ -61,7 +61,7 @@ def test_a_limit_is_stated_with_its_side_and_its_tolerance(finding: Finding, tex
     verdict = Verdict((finding,), flyable=False, complete=True, lines=("",), level="flown")
     shown = texts[1].replace("-", "\N{MINUS SIGN}").replace(" ", "\u00a0", 1)
     assert finding_document(finding).passes == ("≤ 8.29 m" if finding is PASSED else texts[1])
-    assert finding_rows([finding])[0].limit.split()[0] == shown.split("\u00a0")[0]
+    assert number_texts(finding).limit.split()[0] == shown.split("\u00a0")[0]
     assert f"{texts[0]} (limit {texts[1]}" in "\n".join(verdict_lines(verdict, ()))
 
 
@@ -86,7 +86,7 @@ def test_limit_of_a_value_within_its_tolerance_is_shown_without_it() -> None:
     # The values that pass include the tolerance.
     document = finding_document(finding)
     assert (document.limit, document.passes) == (-5.09, "≥ -5.59°")
-    (row,) = finding_rows([finding])
+    row = number_texts(finding)
     assert (row.limit, row.margin) == ("≥\u00a0\N{MINUS SIGN}5.09", "\N{MINUS SIGN}0.29")
     state = finding_state(finding)
     assert state is not None
@@ -113,7 +113,7 @@ def test_a_failing_number_never_looks_like_its_limit(planned: float, beyond: flo
     assert shown != passes[2:]
     left, right = re.split(" [<>] ", RULE_WORDS["slope"].phrase("slope", failed).partition("(")[2].rstrip(")"))
     assert left != right
-    (row,) = finding_rows([failed])
+    row = number_texts(failed)
     assert row.planned != row.limit[2:]
 
 

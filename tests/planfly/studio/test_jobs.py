@@ -142,12 +142,10 @@ def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Job
     before = answer_of(jobs, session, fly)
     # The flight's own list offers nothing that was not tried.
     assert before["verdict"]["failed"]
-    assert [one["suggestions"] for one in before["findings"] if one["suggestions"]] == []
+    assert [one["offers"] for one in before["findings"] if one["offers"]] == []
     assert asked(jobs, FLIGHT_WORKER)[-1].function.endswith("try_flown_suggestions")
     tried = answer_of(jobs, session, try_flown_suggestions)
-    offered = [
-        (one, which) for one in tried["findings"] for which, each in enumerate(one["suggestions"]) if each["apply"]
-    ]
+    offered = [(one, which) for one in tried["findings"] for which, each in enumerate(one["offers"]) if each["apply"]]
     assert offered
     assert jobs.result_messages()[0]["findings"] == tried["findings"]
     finding, which = offered[0]

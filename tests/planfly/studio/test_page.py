@@ -515,8 +515,8 @@ def test_the_profile_has_a_gap_where_the_ground_is_not_known(page: Browser) -> N
 FINDINGS = """import('/panel.js').then(({ Panel }) => {
   const sent = [], raise = { text: 'raise it', apply: true }, verdict = { state: 'fail', answer: 'not flyable',
     headline: '', lines: [], failed: 1 };
-  const finding = (rule, where, ok, ...suggestions) => (
-    { rule, where, ok, suggestions, number: sent.length + suggestions.length, kind: 'leg', index: null, text: '' });
+  const finding = (title, where, ok, ...offers) => (
+    { title, where, ok, offers, number: sent.length + offers.length, place: { kind: 'leg', index: null }, reason: '' });
   const show = (planned, flown, rev = 1) => {
     const app = { now: { work: {} }, commit: (one) => sent.push([one.finding, one.flown]) };
     const box = document.createElement('div');

@@ -660,9 +660,7 @@ def test_a_suggestion_that_fails_its_trial_is_not_offered(monkeypatch: pytest.Mo
     number = next(n for n, one in enumerate(findings) if one.rule == "threat" and one.suggestions)
 
     def offered() -> list[int]:
-        return [
-            one["number"] for one in session.mission_message()["findings"] if one["ok"] is False and one["suggestions"]
-        ]
+        return [one["number"] for one in session.mission_message()["findings"] if one["ok"] is False and one["offers"]]
 
     assert offered() == []
     assert SuggestionTrials(session.context, session.judged).try_suggestion(findings[number], 0) is None
@@ -705,9 +703,9 @@ def test_a_suggested_parameter_is_set_and_undone(tmp_path: Path) -> None:
     session = Session.from_document(Document("low.waypoints", "low", setup, "waypoints"), MissionOptions())
     try_planned(session)
     findings = session.mission_message()["findings"]
-    (finding,) = [one for one in findings if any("RTL_ALTITUDE" in way["text"] for way in one["suggestions"])]
-    (which,) = [k for k, way in enumerate(finding["suggestions"]) if "RTL_ALTITUDE" in way["text"]]
-    assert finding["suggestions"][which]["apply"]
+    (finding,) = [one for one in findings if any("RTL_ALTITUDE" in way["text"] for way in one["offers"])]
+    (which,) = [k for k, way in enumerate(finding["offers"]) if "RTL_ALTITUDE" in way["text"]]
+    assert finding["offers"][which]["apply"]
     world, items = session.world_rev, session.mission.items
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=finding["number"], which=which))
     (wanted,) = session.settings_json()["parameters"].values()

@@ -17,9 +17,9 @@ from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.slopes import Ability, LegFit, SlopeMeasure
 from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.presentation import number_texts
 from logs.verdict.rules import slope_rule
 from logs.verdict.rules.slope_rule import slope_findings
-from logs.views.report.text import finding_rows
 from tests.logs.verdict.judging import leg, of
 from tests.synthetic import fly_path, make_setup
 
@@ -87,7 +87,7 @@ def test_a_leg_that_is_planned_too_steeply_has_one_value_and_one_limit(
     assert item.reason.startswith("leg 1 descends at 5.6° for 2.0 km; the scenario allows 5.0°")
     assert (item.value, item.effective_limit) == (pytest.approx(-5.6), pytest.approx(-5.01))
     assert excess_phrase("slope", item) == "slope on leg 1, to item 2 (-5.6° < -5.01°)"
-    (row,) = finding_rows([item])
+    row = number_texts(item)
     assert (row.planned, row.limit, row.margin) == ("−5.60", "≥\u00a0−5.01", "−0.59")
 
 

@@ -16,9 +16,9 @@ from logs.views.report.tables import (
     passage_rows,
     saturation_rows,
 )
-from logs.views.report.text import number
 from planner.plan import GIVEN_WAYPOINTS, Certificate
 from tests.logs.views.report.report_data import make_setup, make_track
+from world.wording import format_number
 
 
 def test_legs_add_up_to_the_flight() -> None:
@@ -67,7 +67,7 @@ def test_stays_and_held_controls_are_those_of_the_track() -> None:
     assert [cells[0] for cells in held] == ["elevator", "aileron", "rudder", "throttle"]
     assert [cells[3] for cells in held[:3]] == ["5.0", "0.0", "0.0"]
     # A closed throttle is at a limit, too: the track's is, all the time.
-    assert held[3][3] == number(float(track.time[-1]), digits=1)
+    assert held[3][3] == format_number(float(track.time[-1]), digits=1)
     assert held[0][2] == "114.6°"
 
 

@@ -13,21 +13,17 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import Spread, compare_with_model
 from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, Place
-from logs.verdict.presentation import findings_by_rule
+from logs.verdict.presentation import finding_words, findings_by_rule, missed_text, number_texts
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
     describe_model_trust,
-    finding_rows,
     list_not_reflown,
-    missed_text,
-    number,
-    quantity,
     refly_lines,
-    rule_row,
 )
 from tests.logs.views.report.report_data import FINDINGS, finding
 from world.scenario import with_wind
+from world.wording import format_number, format_quantity
 
 LEG = Place("leg", 4)
 DECIDING = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", LEG, -8.2)
@@ -64,7 +60,7 @@ def test_tables_call_a_rule_as_the_terminal_does() -> None:
         "departure", FLIGHT, ok=False, reason="bank 80°", flown=80.0, limit=75.0, margin=-5.0, unit="deg"
     )
     (rule,) = findings_by_rule([lost])
-    assert rule_row(rule).rule == finding_rows([lost])[0].rule == rule.words.word == "loss of control"
+    assert rule.cells[0] == finding_words(lost).word == "loss of control"
 
 
 def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
@@ -115,22 +111,22 @@ def test_title_states_the_verdict(
 
 @given(st.floats(-1e9, 1e9))
 def test_numbers_keep_their_value(value: float) -> None:
-    text = number(value)
+    text = format_number(value)
     back = float(text.replace("\u2009", "").replace("−", "-"))
     half_a_last_digit = 5.1e-5 if abs(value) < 0.01 else 5.1e-4 if abs(value) < 0.1 else 5.1e-3
     assert back == pytest.approx(value, rel=0.006, abs=half_a_last_digit)
-    assert number(value, signed=True).lstrip("+−") == text.lstrip("−")
+    assert format_number(value, signed=True).lstrip("+−") == text.lstrip("−")
     assert not text.startswith(("−0.0000", "-"))
     assert text.lstrip("−0.").strip() or not text.startswith("−")
 
 
 def test_numbers_are_shown_with_their_units() -> None:
-    assert number(None) == number(math.nan) == number(math.inf) == "–"
-    assert number(12345.6) == "12\u2009346"
-    assert number(-0.001, digits=1) == "0.0"
-    assert quantity(math.pi / 6, "rad") == "30.0°"
-    assert quantity(4.0, "m/s") == "4.00\u00a0m/s"
-    (row,) = finding_rows([finding("turn", Place("waypoint", 1), True, 0.1, unit="rad", planned=0.5, tolerance=0.01)])
+    assert format_number(None) == format_number(math.nan) == format_number(math.inf) == "–"
+    assert format_number(12345.6) == "12\u2009346"
+    assert format_number(-0.001, digits=1) == "0.0"
+    assert format_quantity(math.pi / 6, "rad") == "30.0°"
+    assert format_quantity(4.0, "m/s") == "4.00\u00a0m/s"
+    row = number_texts(finding("turn", Place("waypoint", 1), True, 0.1, unit="rad", planned=0.5, tolerance=0.01))
     # 0.1 rad of margin and 0.01 rad of tolerance.
     assert (row.planned, row.margin, row.unit) == ("28.6", "+6.30", "°")
 
@@ -138,15 +134,13 @@ def test_numbers_are_shown_with_their_units() -> None:
 @given(st.lists(st.tuples(st.sampled_from([True, False, None]), st.floats(-10, 10)), min_size=1, max_size=12))
 def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) -> None:
     findings = [finding("slope", Place("leg", k), ok, margin) for k, (ok, margin) in enumerate(kinds)]
-    (row,) = map(rule_row, findings_by_rule(findings))
+    (rule,) = findings_by_rule(findings)
     judged = [item for item in findings if item.ok is not None]
     failed = [item for item in judged if item.ok is False]
-    assert row.state == ("fail" if failed else "ok" if judged else "unjudged")
+    assert rule.state == ("fail" if failed else "ok" if judged else "unjudged")
     if judged:
         worst = min(item.margin or 0.0 for item in (failed or judged))
-        assert row.where in [place_text(item.place) for item in findings if item.margin == worst]
-    states = [item.state for item in finding_rows(findings)]
-    assert states == sorted(states, key=["fail", "ok", "unjudged"].index)
+        assert rule.cells[3] in [place_text(item.place) for item in findings if item.margin == worst]
 
 
 LOG = example_log()
