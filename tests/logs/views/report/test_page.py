@@ -192,7 +192,7 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "Start: in the air",
         "The broad line is the plan",
         "What fails",
-        "leg 1, slope: why leg 1. Missed by 3.35°.",
+        "slope at leg 1: why leg 1. Missed by 3.35°.",
         "What else was judged",
         "One row per rule",
         "item 9: no loiter",
