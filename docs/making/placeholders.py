@@ -14,7 +14,7 @@ from making.public_names import name_tables, public_names
 from making.quantities import quantity_table
 from making.schemas import answer_table, schema_tables
 from making.state_fields import state_fields
-from making.tolerances import all_tolerances, rule_tolerances
+from making.tolerances import tolerance_tables
 
 _PLACE = re.compile(
     r"^<!-- made: (?P<name>\w+)(?P<words>(?: [\w./-]+)*) -->\n(?:.*?\n)??<!-- end of (?P=name) -->$",
@@ -30,8 +30,7 @@ MAKERS: dict[str, Callable[..., str]] = {
     "quantities": quantity_table,
     "schema": schema_tables,
     "state": state_fields,
-    "tolerances": rule_tolerances,
-    "all_tolerances": all_tolerances,
+    "tolerances": tolerance_tables,
 }
 # What the built pages have instead: Sphinx writes signatures and docstrings out.
 BUILT: dict[str, Callable[..., str]] = {"names": public_names}

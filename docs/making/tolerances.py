@@ -72,22 +72,22 @@ def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
 
 
 def _table(rows: list[Tolerance]) -> str:
-    body = "\n".join(f"| `{one.name}` | {one.value} | {one.unit} | {one.text.replace('|', '/')} |" for one in rows)
-    return f"| constant | value | unit | meaning and source |\n|---|---|---|---|\n{body}"
+    body = "\n".join(
+        f"| `{one.name}` | {one.value} | {one.unit} | {_rules(one.name)} | {one.text.replace('|', '/')} |"
+        for one in rows
+    )
+    return f"| constant | value | unit | rules | meaning and source |\n|---|---|---|---|---|\n{body}"
 
 
-def rule_tolerances(rule: str) -> str:
-    """Return the names and values of the tolerances that a rule and its measures judge with."""
-    rows = [one for one in tolerance_list() if one.name in RULES[rule].tolerances]
-    body = "\n".join(f"| `{one.name}` | {one.value} |" for one in rows)
-    return f"| constant ([meaning](#all-tolerances)) | value |\n|---|---|\n{body}"
+def _rules(name: str) -> str:
+    """Return the names of the rules that judge with a tolerance."""
+    return ", ".join(rule.name for rule in RULES.values() if name in rule.tolerances)
 
 
-def all_tolerances() -> str:
+def tolerance_tables() -> str:
     """Return every tolerance, one table per heading."""
     headings = dict.fromkeys(one.heading for one in tolerance_list())
     parts = [
-        f"### {heading}\n\n{_table([one for one in tolerance_list() if one.heading == heading])}"
-        for heading in headings
+        f"## {heading}\n\n{_table([one for one in tolerance_list() if one.heading == heading])}" for heading in headings
     ]
     return "\n\n".join(parts)

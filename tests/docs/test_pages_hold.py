@@ -66,17 +66,13 @@ def test_the_first_flight_is_as_its_page_says() -> None:
     assert f"{np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1).sum() / 1000.0:.1f} km in all" in words
 
 
-def test_every_rule_has_a_section_with_the_tolerances_that_it_uses() -> None:
+def test_every_rule_has_a_section() -> None:
     page = text_of("verdict.md")
-    for rule in RULES:
-        assert f"\n### {rule}\n" in page, rule
-    source = (ROOT / "docs" / "verdict.md").read_text(encoding="utf-8")
-    made = set(re.findall(r"^<!-- made: tolerances (\w+) -->$", source, re.MULTILINE))
-    assert made == {rule.name for rule in RULES.values() if rule.tolerances}
+    assert [rule for rule in RULES if f"\n### {rule}\n" not in page] == []
 
 
 def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
-    page = text_of("verdict.md")
+    page = text_of("verdict-tolerances.md")
     names = [name for name in vars(tolerances) if name.isupper()]
     assert len(names) > 80
     for name in names:
