@@ -132,9 +132,7 @@ def _flown_finding(
                 distance, ok, facts = math.nan, None, ()
                 reason = f"not reached: the flight ended on {place_text(last_leg)}"
         elif not ok:
-            owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
-                source, "the fly-by path's"
-            )
+            owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(source, "the fly-by path's")
             purpose = RULE_WORDS["waypoint"].tolerance_purpose
             error_text = f" plus {tolerance:.1f} m for {purpose}" if tolerance else ""
             condition_text = f"the waypoint counts as reached within {limit:.0f} m ({owner} radius)"
