@@ -110,10 +110,9 @@ def _read_text(path: Path) -> str:
 # ----------------------------------------------------------------------
 # The QGC WPL 110 text form of a mission (`.waypoints`): read leniently, written for the strictest reader.
 #
-# A header line, then twelve columns per line: seq, current, frame, command, p1..p4, latitude, longitude, altitude,
-# autocontinue (MAVLink file formats, "Plain-Text File Format"). Line 0 is home whatever its command, and is not flown.
-# A file whose first line has another number has no home: Mission Planner inserts an empty one, and so does planfly;
-# QGroundControl and MAVProxy take even that line for home.
+# A header line, then one item per line, in the columns `_COLUMNS` (MAVLink file formats, "Plain-Text File Format").
+# Line 0 is home whatever its command, and is not flown. A file whose first line has another number has no home: Mission
+# Planner inserts an empty one, and so does planfly; QGroundControl and MAVProxy take even that line for home.
 
 # First line of the file.
 HEADER = "QGC WPL 110"
@@ -122,35 +121,27 @@ HOME_LINE_MISSING_TEXT = "the file has no home line"
 # Maximum number of lines in a file, comments and empty lines included: ten per item.
 MAX_LINES = 10 * MAX_ITEMS
 
-# Columns of a line.
-_COLUMNS = (
-    "seq",
-    "current",
-    "frame",
-    "command",
-    "p1",
-    "p2",
-    "p3",
-    "p4",
-    "latitude",
-    "longitude",
-    "altitude",
-    "autocontinue",
-)
+# Columns of a line, each with the allowed range of a whole number; None for a decimal number.
+_COLUMNS: dict[str, tuple[int, int] | None] = {
+    "seq": (0, 65535),
+    "current": (0, 1),
+    "frame": (0, 255),
+    "command": (0, 65535),
+    "p1": None,
+    "p2": None,
+    "p3": None,
+    "p4": None,
+    "latitude": None,
+    "longitude": None,
+    "altitude": None,
+    "autocontinue": (0, 1),
+}
 # A whole number.
 _WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,10}")
 # A decimal number.
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # Commands that also have files of their own.
 _COMMANDS_WITH_OWN_FILES = FENCES | {Command.NAV_RALLY_POINT}
-# Range of each column of whole numbers.
-_ALLOWED_RANGES = {
-    "seq": (0, 65535),
-    "current": (0, 1),
-    "frame": (0, 255),
-    "command": (0, 65535),
-    "autocontinue": (0, 1),
-}
 
 
 def parse_mission(text: str, source: str) -> Mission:
@@ -177,44 +168,12 @@ def parse_mission(text: str, source: str) -> Mission:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     _check_lines(lines, source)
-    items: list[MissionItem] = []
-    locations: list[TextLine] = []
-    has_current = False
-    for number, line in lines[1:]:
-        location, fields = TextLine(source, number), line.split()
-        if len(fields) != len(_COLUMNS):
-            raise MissionError(
-                f"{location}: {count_text(len(fields), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
-                file=location.file,
-            )
-        columns = dict(zip(_COLUMNS, fields, strict=True))
-        for name, (min_value, max_value) in _ALLOWED_RANGES.items():
-            value = columns[name]
-            if not _WHOLE_NUMBER.fullmatch(value) or not min_value <= int(value) <= max_value:
-                allowed = f"expected a whole number {min_value}..{max_value}"
-                raise _value_error(location, name, value, _short_repr(value), allowed)
-        for name in _COLUMNS[4:11]:
-            value = columns[name]
-            if not _NUMBER.fullmatch(value) or not math.isfinite(float(value)):
-                hint = " (a decimal comma?)" if "," in value else ""
-                raise _value_error(location, name, value, _short_repr(value), f"expected a finite number{hint}")
-        integers = {name: int(columns[name]) for name in _ALLOWED_RANGES}
-        # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
-        p1, p2, p3, p4, lat, lon, alt = (float(columns[name]) + 0.0 for name in _COLUMNS[4:11])
-        # A home line of Mission Planner may carry command 0.
-        command = int(integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0))
-        frame, continues = integers["frame"], bool(integers["autocontinue"])
-        if is_located(command, frame) and position_problem(lat, lon) is None:
-            lat, lon = round_to_grid(lat), round_to_grid(lon)
-        item = MissionItem(integers["seq"], command, frame, (p1, p2, p3, p4), lat, lon, alt, continues)
-        problem = item_problem(item)
-        if problem is not None:
-            raise MissionError(**problem.error_arguments(location.file, location))
-        items.append(item)
-        locations.append(location)
-        has_current |= bool(integers["current"])
+    locations = [TextLine(source, number) for number, _ in lines[1:]]
+    read_items = [_read_item(location, line) for location, (_, line) in zip(locations, lines[1:], strict=True)]
+    items = [item for item, _ in read_items]
     if not items:
         raise MissionError(f"{source}: no items after the header", file=source)
+    has_current = any(is_current for _, is_current in read_items)
     warnings = _collect_warnings(locations, items, has_current=has_current)
     # Fence and rally items without a home line are numbered from 0, too.
     first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
@@ -255,11 +214,44 @@ def _check_lines(lines: list[tuple[int, str]], source: str) -> None:
         raise MissionError(f"{source}: too long: {len(lines) - 1:,} items; the limit is {MAX_ITEMS:,}", file=source)
 
 
-def _value_error(location: TextLine, field: str, value: str | int, value_text: str, allowed: str) -> MissionError:
-    """Return the error for a value in a line of the file."""
-    return MissionError(
-        f"{location}: {field} {value_text}: {allowed}", file=location.file, field=field, value=value, allowed=allowed
-    )
+def _read_item(location: TextLine, line: str) -> tuple[MissionItem, bool]:
+    """Return the item in a line of a WPL 110 text, and True if the line is marked as current.
+
+    location: the line in messages.
+
+    Raises MissionError for the first column with an invalid value, and for an item that no autopilot accepts.
+    """
+    texts = line.split()
+    if len(texts) != len(_COLUMNS):
+        raise MissionError(
+            f"{location}: {count_text(len(texts), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
+            file=location.file,
+        )
+    values = []
+    for (name, allowed_range), text in zip(_COLUMNS.items(), texts, strict=True):
+        if allowed_range is None:
+            is_valid = _NUMBER.fullmatch(text) and math.isfinite(float(text))
+            allowed = f"expected a finite number{' (a decimal comma?)' if ',' in text else ''}"
+        else:
+            min_value, max_value = allowed_range
+            is_valid = _WHOLE_NUMBER.fullmatch(text) and min_value <= int(text) <= max_value
+            allowed = f"expected a whole number {min_value}..{max_value}"
+        if not is_valid:
+            message = f"{location}: {name} {_short_repr(text)}: {allowed}"
+            raise MissionError(message, file=location.file, field=name, value=text, allowed=allowed)
+        # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
+        values.append(float(text) + 0.0)
+    seq, current, frame, command, p1, p2, p3, p4, lat, lon, alt, autocontinue = values
+    # A home line of Mission Planner may carry command 0.
+    command = command or (Command.NAV_WAYPOINT if seq == 0 else 0)
+    if is_located(int(command), int(frame)) and position_problem(lat, lon) is None:
+        lat, lon = round_to_grid(lat), round_to_grid(lon)
+    params = (p1, p2, p3, p4)
+    item = MissionItem(int(seq), int(command), int(frame), params, lat, lon, alt, bool(autocontinue))
+    problem = item_problem(item)
+    if problem is not None:
+        raise MissionError(**problem.error_arguments(location.file, location))
+    return item, bool(current)
 
 
 def _begins_with_home(items: list[MissionItem]) -> bool:

@@ -342,8 +342,12 @@ def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verd
         tuple(None if aligned is None else measure_line(requirements, aligned, survey, line) for line in survey.lines)
         for survey in surveys
     )
-    circles = [] if aligned is None else waypoint_circles(requirements, aligned)
-    survey_circles = [circle for circle in circles if any(survey.has_leg(circle.waypoint - 1) for survey in surveys)]
+    circles = {} if aligned is None else waypoint_circles(requirements, aligned)
+    survey_circles = {
+        waypoint: height_error
+        for waypoint, height_error in circles.items()
+        if any(survey.has_leg(waypoint - 1) for survey in surveys)
+    }
     overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, survey) for survey in surveys)
     photos = 0 if aligned is None else count_flight_photos(requirements, aligned)
     circles_note = circles_text(requirements, survey_circles)

@@ -11,7 +11,7 @@ from flight.simulation.track import ROLL, THROTTLE, Track
 from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, project_onto_leg
-from logs.verdict.measures.turns import WaypointPass, measure_passes, measure_turn
+from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -70,7 +70,7 @@ class TurnPair:
 
     waypoint: index in the whole route.
     turn: planned course change, deg.
-    overshoot: m, as in `logs.verdict.measures.turns.WaypointPass`.
+    overshoot: maximum distance outside the next leg, m.
     bank: maximum absolute bank, deg.
     passed: minimum distance from the waypoint, m.
     """
@@ -165,8 +165,11 @@ def compare_with_model(
         _leg_pair(stretch_legs.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
         for k in range(requirements.legs)
     )
-    corners = [measure_passes(flight_requirements, track) for flight_requirements, track in pairs]
-    turns = tuple(_turn_pair(stretch_legs.first, k, pairs, corners) for k in range(1, requirements.legs))
+    measures = [measure_turns(flight_requirements, track, follows_arcs=False) for flight_requirements, track in pairs]
+    turns = tuple(
+        _turn_pair(stretch_legs.first + k, float(stretch_legs.requirements.turns[k]), *turn_measures)
+        for k, turn_measures in enumerate(zip(*measures, strict=True), 1)
+    )
     # The differences between both flights by quantity, if both know it at the same points.
     (flown_profile, model_profile), spreads = profiles, []
     for name, unit, factor in (
@@ -274,33 +277,23 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     )
 
 
-def _turn_pair(
-    first_waypoint: int,
-    waypoint: int,
-    pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
-    corners: Sequence[Sequence[WaypointPass]],
-) -> TurnPair:
-    """Compare the flown and the simulated turn at one waypoint of the stretch.
+def _turn_pair(waypoint: int, planned_turn: float, flown: TurnMeasure, model: TurnMeasure) -> TurnPair:
+    """Compare the flown and the simulated turn at a waypoint.
 
-    first_waypoint: number of the stretch's first waypoint in the whole route.
-    waypoint: number of the waypoint in the stretch.
-    pairs: requirements and aligned track of the flown and of the simulated flight.
-    corners: passes of the waypoints in the flown and in the simulated flight.
+    waypoint: number of the waypoint in the whole route.
+    planned_turn: planned course change, rad.
     """
-    flown_turn, model_turn = (measure_turn(requirements, aligned, waypoint) for requirements, aligned in pairs)
-    flown_pass, model_pass = (passes[waypoint] for passes in corners)
 
-    def value_pair(flown_value: float | None, model_value: float | None, factor: float = 1.0) -> tuple[float, float]:
-        """Return both values times a factor, with NaN instead of None."""
-        return (
-            math.nan if flown_value is None else flown_value * factor,
-            math.nan if model_value is None else model_value * factor,
-        )
+    def value_pair(name: str, factor: float = 1.0) -> tuple[float, float]:
+        """Return one quantity of both turns times a factor, with NaN instead of None."""
+        values = (getattr(flown, name), getattr(model, name))
+        flown_value, model_value = (math.nan if value is None else value * factor for value in values)
+        return flown_value, model_value
 
     return TurnPair(
-        first_waypoint + waypoint,
-        math.degrees(float(pairs[0][0].turns[waypoint])),
-        overshoot=value_pair(flown_pass.overshoot, model_pass.overshoot),
-        bank=value_pair(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
-        passed=value_pair(flown_pass.distance, model_pass.distance),
+        waypoint,
+        math.degrees(planned_turn),
+        overshoot=value_pair("overshoot"),
+        bank=value_pair("peak_bank", 180.0 / math.pi),
+        passed=value_pair("min_distance"),
     )

@@ -1,7 +1,7 @@
 """Decide when a waypoint is reached, and how far from the legs a flight may be."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,6 @@ from logs.verdict.measures.route_requirements import (
     turn_requirements,
 )
 from logs.verdict.tolerances import (
-    CORNER_CUT_TOLERANCE_M,
     FLY_OVER_SWING_RATIO,
     KINK_FRACTION,
     KINK_WAYPOINT_COUNT,
@@ -32,42 +31,26 @@ from logs.verdict.tolerances import (
 from world.arrays import Floats
 
 
-@dataclass(frozen=True, slots=True)
-class AcceptanceCondition:
-    """Distance within which a waypoint is reached.
+def acceptance_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
+    """Return the distance within which a waypoint is reached, m, and its source.
 
-    radius: m.
-    source: "mission" for a stated acceptance radius, "autopilot" for the autopilot's acceptance radius, "fly-over", or
-        "fly-by path" for the distance at which the path itself passes.
-    tolerance: distance by which the radius may be missed, m: navigation error, and displacement by gusts.
+    The sources are "mission" (the acceptance radius of the item), "autopilot" (the acceptance radius of the autopilot),
+    and for an autopilot that follows the path "fly-over" and "fly-by path" (the distance at which the path passes, and
+    a margin).
+
+    ArduPlane turns to the next leg at WP_RADIUS before a corner of 90 degrees or more, and at a fraction of WP_RADIUS
+    before a gentler corner. The full WP_RADIUS is allowed at the mission's end and where a return to launch begins.
     """
-
-    radius: float
-    source: str
-    tolerance: float
-
-
-def acceptance_condition(requirements: RouteRequirements, waypoint: int) -> AcceptanceCondition:
-    """Return the distance within which a waypoint is reached, and its source.
-
-    The radius of the mission item applies, or else the autopilot's radius, or for an autopilot that follows the path
-    the distance at which the path itself passes.  ArduPlane turns to the next leg at
-    WP_RADIUS before a corner of 90 degrees or more, and at a fraction of WP_RADIUS before a gentler corner.  The full
-    WP_RADIUS is allowed at the mission's end and where a return to launch begins.
-    """
-    setup, path_radius = requirements.setup, float(requirements.fly_by_offset[waypoint]) + WAYPOINT_PASS_MARGIN_M
+    setup = requirements.setup
     mission_radius = float(setup.route.points["acceptance_radius"][waypoint])
-    tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     if mission_radius > 0.0:
-        return AcceptanceCondition(mission_radius, "mission", tolerance)
+        return mission_radius, "mission"
     if not setup.autopilot.turns.follows_path:
         is_inner = 0 < waypoint < requirements.legs and waypoint != setup.route.rtl_start
         turn = abs(float(requirements.turns[waypoint])) if is_inner else math.pi
-        return AcceptanceCondition(
-            setup.autopilot.turns.distance(turn, float(requirements.points[waypoint, 2])), "autopilot", tolerance
-        )
-    source = "fly-over" if setup.route.fly_over[waypoint] else "fly-by path"
-    return AcceptanceCondition(path_radius, source, tolerance=0.0)
+        return setup.autopilot.turns.distance(turn, float(requirements.points[waypoint, 2])), "autopilot"
+    path_radius = float(requirements.fly_by_offset[waypoint]) + WAYPOINT_PASS_MARGIN_M
+    return path_radius, "fly-over" if setup.route.fly_over[waypoint] else "fly-by path"
 
 
 def position_error(setup: FlightSetup) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flight.mission.items import Camera, Command, Mission
 from flight.mission.surveys import LineAxis, PhotoLine, Survey, camera_spacing, survey_plan
 from flight.simulation.track import ROLL, YAW
-from logs.verdict.measures.acceptance import acceptance_condition, position_error
+from logs.verdict.measures.acceptance import acceptance_limit, position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import (
@@ -267,7 +267,7 @@ def _switch_radii(
         return 0.0
     if turns.radii_at is not None:
         return turns.radii_at(np.hypot(*aligned.track.velocity[track_rows, :2].T))
-    return acceptance_condition(requirements, waypoint).radius
+    return acceptance_limit(requirements, waypoint)[0]
 
 
 def planned_switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
@@ -278,7 +278,7 @@ def planned_switch_radius(requirements: RouteRequirements, waypoint: int) -> flo
     if turns.radii_at is not None:
         leg = max(0, waypoint - 1)
         return float(turns.radii_at(requirements.ground_speed[leg : leg + 1])[0])
-    return acceptance_condition(requirements, waypoint).radius
+    return acceptance_limit(requirements, waypoint)[0]
 
 
 def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:

@@ -17,7 +17,7 @@ from flight.mission.ground_phases import GroundPhases, airborne_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
-from logs.verdict.measures.acceptance import acceptance_condition
+from logs.verdict.measures.acceptance import acceptance_limit
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_progress import (
     RouteProgress,
@@ -211,7 +211,7 @@ def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
         requirements.points[:, :2].copy(),
         np.array(
             [
-                max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, waypoint).radius)
+                max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_limit(requirements, waypoint)[0])
                 for waypoint, offset in enumerate(offsets)
             ]
         ),

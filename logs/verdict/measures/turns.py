@@ -1,6 +1,7 @@
 """Measure how each turn was flown: angle, bank, radius, overshoot, and where the aircraft settled."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,93 +13,6 @@ from logs.verdict.measures.slopes import leg_course
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
 from logs.verdict.tolerances import SETTLING_WATCH_TIME_S
 from world.arrays import Floats
-
-# ----------------------------------------------------------------------
-# Corners of an imported flight: closest approach to the waypoint, and overshoot beyond the next leg.
-#
-# The autopilot of an imported flight does not follow planfly's arcs.  It turns when it considers the waypoint reached.
-# So its corners are compared with the waypoint and the next leg.
-
-# Fraction of the next leg over which a corner is examined; the next corner may begin after it.
-NEXT_LEG_FRACTION = 0.7
-
-
-@dataclass(frozen=True, slots=True)
-class WaypointPass:
-    """Measured pass of one waypoint of an imported flight.
-
-    time: time of the closest approach, s.
-    distance: horizontal distance from the waypoint at that time, m.
-    overshoot: maximum distance from the next leg on the outside of the turn, m, up to `NEXT_LEG_FRACTION` of that leg
-        or the closest approach to the next waypoint, whichever is sooner; None if the next leg was not joined.
-    overrun: distance past the next leg's end at the closest approach, m, if the leg was not joined; otherwise 0.
-    """
-
-    time: float
-    distance: float
-    overshoot: float | None
-    overrun: float = 0.0
-
-
-def measure_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[WaypointPass, ...]:
-    """Measure how a track passes each waypoint of a route: time, distance and overshoot, in the order of the route.
-
-    >>> from logs.recording.example_log import example_log
-    >>> from logs.verdict.measures.route_requirements import route_requirements
-    >>> from logs.verdict.measures.track_alignment import align_track
-    >>> log = example_log()
-    >>> requirements = route_requirements(log.setup)
-    >>> passes = measure_passes(requirements, align_track(requirements, log.track))
-    >>> len(passes) == requirements.legs + 1, passes[1].distance < 60.0
-    (True, True)
-    """
-    track_time, rows = aligned.track.time, aligned.rows
-    # Time and distance of the closest approach to each waypoint; the times never decrease.
-    nearest_passes: list[tuple[float, float]] = []
-    start_time = float(track_time[0])
-    for k in range(len(rows)):
-        # The search ends at the row of the next waypoint that has a later row.
-        later_rows = rows[k + 1 :][track_time[rows[k + 1 :]] > max(float(track_time[rows[k]]), start_time)]
-        end_time = float(track_time[later_rows[0]] if later_rows.size else track_time[-1])
-        times, positions = _track_between(aligned, start_time, end_time)
-        distances, fractions = closest_approaches(positions, requirements.points[k])
-        row = int(np.argmin(distances))
-        start_time = float(times[row] + fractions[row] * (times[row + 1] - times[row]))
-        nearest_passes.append((start_time, float(distances[row])))
-    passes = []
-    for k, (time, distance) in enumerate(nearest_passes):
-        overshoot, overrun = None, 0.0
-        if 0 < k < requirements.legs:
-            earliest_time, later_passes = time + aligned.tick, nearest_passes[k + 1 :]
-            next_time = next((later for later, _ in later_passes if later > earliest_time), float(track_time[-1]))
-            leg_length, positions = float(requirements.runs[k]), _track_between(aligned, time, next_time)[1]
-            distance_along, lateral_offset = project_onto_leg(requirements, k, positions)
-            rows_past = np.flatnonzero(distance_along >= NEXT_LEG_FRACTION * leg_length)
-            end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
-            outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
-            if distance_along[0] > leg_length:
-                # The aircraft was already beyond the end of the next leg.
-                overrun = float(distance_along[0]) - leg_length
-            else:
-                overshoot = max(0.0, float(outside_offset[: max(1, end_row)].max()))
-            if overshoot is not None and 0 < end_row < len(distance_along):
-                # Interpolate to the exact end: rows may be a second apart.
-                along_before, along = distance_along[end_row - 1 : end_row + 1].tolist()
-                offset_before, offset = outside_offset[end_row - 1 : end_row + 1].tolist()
-                fraction = (NEXT_LEG_FRACTION * leg_length - along_before) / (along - along_before)
-                overshoot = max(overshoot, offset_before + fraction * (offset - offset_before))
-        passes.append(WaypointPass(time, distance, overshoot, overrun))
-    return tuple(passes)
-
-
-def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return times (s, (n,)) and positions (m, (n, 3)) of the track between two times, s.
-
-    Both ends are interpolated.
-    """
-    time = aligned.track.time
-    times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
-    return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +26,11 @@ class TurnMeasure:
     radius: minimum radius over one second, m.
     overshoot: maximum distance outside the arc, and after the arc outside the next leg, m.
     settled_distance: mean distance from the next leg in the last second before its end, m.
-    min_distance: minimum distance from the waypoint, m.
+    min_distance: minimum horizontal distance from the waypoint, m.
     full_circles: number of full circles flown in addition to the corner's turn.
     is_complete: True if the flight went on after the turn.
-    corner: for an imported flight, the measured pass of the waypoint; ``overshoot`` and ``min_distance`` are taken from
-        it.
+    pass_time: time of the closest approach to the waypoint, s, of a flight that does not follow the arcs.
+    overrun: distance past the next leg's end at that time, m; 0 if the flight joined the leg.
     """
 
     angle: float | None = None
@@ -130,22 +44,27 @@ class TurnMeasure:
     min_distance: float | None = None
     full_circles: int = 0
     is_complete: bool = False
-    corner: WaypointPass | None = None
+    pass_time: float | None = None
+    overrun: float = 0.0
 
 
-def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
+def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack, *, follows_arcs: bool) -> list[TurnMeasure]:
     """Measure the turn at every inner waypoint, in order.
 
-    In an imported flight, overshoot and minimum distance are those of the corner (`WaypointPass`).
+    follows_arcs: True for a flight along planfly's arcs. False to measure overshoot and minimum distance at the corner
+        of the two legs (`_with_passes`).
+
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.measures.route_requirements import route_requirements
+    >>> from logs.verdict.measures.track_alignment import align_track
+    >>> log = example_log()
+    >>> requirements = route_requirements(log.setup)
+    >>> measures = measure_turns(requirements, align_track(requirements, log.track), follows_arcs=False)
+    >>> len(measures) == requirements.legs - 1, measures[0].min_distance < 60.0
+    (True, True)
     """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
-    if requirements.setup.imported_log is None:
-        return measures
-    corners = measure_passes(requirements, aligned)[1:-1]
-    return [
-        replace(measure, overshoot=corner.overshoot, min_distance=corner.distance, corner=corner)
-        for measure, corner in zip(measures, corners, strict=True)
-    ]
+    return measures if follows_arcs else _with_passes(requirements, aligned, measures)
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> TurnMeasure:
@@ -259,3 +178,73 @@ def _arc_overshoot(
     center_offset = position[is_in_arc, :2] - center
     distance_outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[waypoint]
     return max(0.0, float(distance_outside.max())) if distance_outside.size else 0.0
+
+
+# ----------------------------------------------------------------------
+# Corners of an imported flight: closest approach to the waypoint, and overshoot beyond the next leg.
+#
+# The autopilot of an imported flight does not follow planfly's arcs.  It turns when it considers the waypoint reached.
+# So its corners are compared with the waypoint and the next leg.
+
+# Fraction of the next leg over which a corner is examined; the next corner may begin after it.
+NEXT_LEG_FRACTION = 0.7
+
+
+def _with_passes(
+    requirements: RouteRequirements, aligned: AlignedTrack, measures: Sequence[TurnMeasure]
+) -> list[TurnMeasure]:
+    """Return turn measures with the closest approach to each waypoint, and the overshoot after it.
+
+    measures: measures of the turns at all inner waypoints, in order.
+
+    The overshoot is the maximum distance from the next leg on the outside of the turn, up to `NEXT_LEG_FRACTION` of
+    that leg or the closest approach to the next waypoint, whichever is sooner. It is None if the leg was not joined.
+    """
+    track_time, rows = aligned.track.time, aligned.rows
+    # Time and distance of the closest approach to each waypoint; the times never decrease.
+    nearest_passes: list[tuple[float, float]] = []
+    start_time = float(track_time[0])
+    for k in range(len(rows)):
+        # The search ends at the row of the next waypoint that has a later row.
+        later_rows = rows[k + 1 :][track_time[rows[k + 1 :]] > max(float(track_time[rows[k]]), start_time)]
+        end_time = float(track_time[later_rows[0]] if later_rows.size else track_time[-1])
+        times, positions = _track_between(aligned, start_time, end_time)
+        distances, fractions = closest_approaches(positions, requirements.points[k])
+        row = int(np.argmin(distances))
+        start_time = float(times[row] + fractions[row] * (times[row + 1] - times[row]))
+        nearest_passes.append((start_time, float(distances[row])))
+    passed_turns = []
+    for k, measure in enumerate(measures, 1):
+        time, distance = nearest_passes[k]
+        overshoot, overrun = None, 0.0
+        earliest_time, later_passes = time + aligned.tick, nearest_passes[k + 1 :]
+        next_time = next((later for later, _ in later_passes if later > earliest_time), float(track_time[-1]))
+        leg_length, positions = float(requirements.runs[k]), _track_between(aligned, time, next_time)[1]
+        distance_along, lateral_offset = project_onto_leg(requirements, k, positions)
+        rows_past = np.flatnonzero(distance_along >= NEXT_LEG_FRACTION * leg_length)
+        end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
+        outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
+        if distance_along[0] > leg_length:
+            # The aircraft was already beyond the end of the next leg.
+            overrun = float(distance_along[0]) - leg_length
+        else:
+            overshoot = max(0.0, float(outside_offset[: max(1, end_row)].max()))
+        if overshoot is not None and 0 < end_row < len(distance_along):
+            # Interpolate to the exact end: rows may be a second apart.
+            along_before, along = distance_along[end_row - 1 : end_row + 1].tolist()
+            offset_before, offset = outside_offset[end_row - 1 : end_row + 1].tolist()
+            fraction = (NEXT_LEG_FRACTION * leg_length - along_before) / (along - along_before)
+            overshoot = max(overshoot, offset_before + fraction * (offset - offset_before))
+        measured_pass = replace(measure, overshoot=overshoot, min_distance=distance, pass_time=time, overrun=overrun)
+        passed_turns.append(measured_pass)
+    return passed_turns
+
+
+def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
+    """Return times (s, (n,)) and positions (m, (n, 3)) of the track between two times, s.
+
+    Both ends are interpolated.
+    """
+    time = aligned.track.time
+    times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
+    return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])

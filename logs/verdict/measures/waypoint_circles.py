@@ -1,12 +1,12 @@
 """Find waypoints at which an autopilot circled because the aircraft was not at the waypoint's altitude."""
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
+from itertools import islice
 
 import numpy as np
 
-from logs.verdict.measures.acceptance import acceptance_condition
+from logs.verdict.measures.acceptance import acceptance_limit
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.wording import place_text
@@ -17,27 +17,16 @@ _MIN_CIRCLE_RAD = 0.5 * math.pi
 _MAX_NAMED = 4
 
 
-class WaypointCircle(NamedTuple):
-    """Circle that an autopilot flew at a plain waypoint to reach the waypoint's altitude.
+def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> dict[int, float]:
+    """Return the plain waypoints at which the aircraft circled, each with its altitude error on arrival, m.
 
-    waypoint: index of the waypoint.
-    height_error: altitude error with which the aircraft reached the waypoint, m, positive above.
-    """
-
-    waypoint: int
-    height_error: float
-
-
-def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> list[WaypointCircle]:
-    """Return the circles that were flown at waypoints reached outside the altitude tolerance.
-
-    Some autopilots circle at a waypoint until they are within their altitude tolerance.  Return [] for an autopilot
-    that flies on at any altitude.
+    The error is positive above.  Some autopilots circle at a waypoint until they are within their altitude tolerance.
+    Return {} for an autopilot that flies on at any altitude.
     """
     setup, route, track = requirements.setup, requirements.setup.route, aligned.track
     if not setup.autopilot.deviations.altitude_parameter:
-        return []
-    circles, begin = [], 0
+        return {}
+    circles, begin = dict[int, float](), 0
     for waypoint in range(1, len(route.points)):
         if not aligned.passed[waypoint - 1] or waypoint - 1 in route.rtl_legs:
             break
@@ -47,18 +36,18 @@ def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> 
         stop = int(aligned.rows[min(waypoint + 2, requirements.legs)]) + 1 if aligned.passed[waypoint] else len(track)
         offsets = track.position[begin : max(stop, begin + 1)] - requirements.points[waypoint]
         is_off = np.abs(offsets[:, 2]) > setup.autopilot.loiters.altitude_tolerance
-        is_near = np.hypot(offsets[:, 0], offsets[:, 1]) <= acceptance_condition(requirements, waypoint).radius
+        is_near = np.hypot(offsets[:, 0], offsets[:, 1]) <= acceptance_limit(requirements, waypoint)[0]
         is_past = offsets[:, :2] @ requirements.leg_unit(waypoint - 1) > 0.0
         is_reached = (is_near | is_past) & ~is_off
         end = int(np.argmax(is_reached)) if is_reached.any() else len(offsets) - 1
         rows_off = np.flatnonzero(is_off[:end] & is_near[:end])
         if rows_off.size and np.ptp(aligned.course[begin + int(rows_off[0]) : begin + end]) >= _MIN_CIRCLE_RAD:
-            circles.append(WaypointCircle(waypoint, float(offsets[rows_off[0], 2])))
+            circles[waypoint] = float(offsets[rows_off[0], 2])
         begin += end
     return circles
 
 
-def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCircle]) -> str:
+def circles_text(requirements: RouteRequirements, circles: Mapping[int, float]) -> str:
     """State where an autopilot circled, its altitude errors, and the parameter that limits them.
 
     Return "" without circles.
@@ -67,8 +56,8 @@ def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCirc
         return ""
     autopilot = requirements.setup.autopilot
     places = [
-        f"{place_text(requirements.waypoint(circle.waypoint))} (height error {circle.height_error:+.0f} m)"
-        for circle in circles[:_MAX_NAMED]
+        f"{place_text(requirements.waypoint(waypoint))} (height error {height_error:+.0f} m)"
+        for waypoint, height_error in islice(circles.items(), _MAX_NAMED)
     ]
     more_text = f" and {len(circles) - _MAX_NAMED} more" if len(circles) > _MAX_NAMED else ""
     return (

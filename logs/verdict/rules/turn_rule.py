@@ -7,7 +7,7 @@ import numpy as np
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink_distance
+from logs.verdict.measures.acceptance import acceptance_limit, negligible_kink_distance
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -40,7 +40,8 @@ def turn_findings(
     """
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
-        measures = [*measure_turns(requirements, aligned)]
+        follows_arcs = requirements.setup.imported_log is None
+        measures = [*measure_turns(requirements, aligned, follows_arcs=follows_arcs)]
     turnaround_waypoints = requirements.turnaround_waypoints()
     return [
         _turn_finding(requirements, waypoint, measure, aligned)
@@ -99,7 +100,7 @@ def _turn_finding(
             ("settled", measure.settled_distance if measure.is_complete else None, "m"),
             ("bank", None if measure.held_bank is None else math.degrees(measure.held_bank), "deg"),
             ("radius", measure.radius, "m"),
-            ("nearest pass", None if measure.corner is None else measure.corner.distance, "m"),
+            ("nearest pass", None if measure.pass_time is None else measure.min_distance, "m"),
         )
         measured_facts = [Fact(quantity, value, unit) for quantity, value, unit in quantities if value is not None]
     return make_finding(
@@ -178,7 +179,7 @@ def _unflown_turn_text(
 
     For an imported flight, the text only states that the legs were not flown one after the other.
     """
-    if measure.corner is not None:
+    if measure.pass_time is not None:
         return "its legs were not flown one after the other"
     if aligned is None or int(aligned.track.leg.max()) < waypoint:
         return "the flight did not get past it"
@@ -187,7 +188,7 @@ def _unflown_turn_text(
     ]
     leg = waypoint if active_times[1] <= active_times[0] else waypoint - 1
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
-    radius = acceptance_condition(requirements, leg + 1).radius
+    radius, _ = acceptance_limit(requirements, leg + 1)
     return (
         f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg(leg))} for only"
         f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
@@ -204,14 +205,13 @@ def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMe
         facts.append(("bank", f"bank up to {math.degrees(measure.peak_bank):.1f}°"))
     if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[waypoint]:
         facts.append(("radius", f"radius {measure.radius:.0f} m"))
-    if measure.corner is not None:
-        facts.append(("nearest pass", f"nearest pass {measure.corner.distance:.1f} m, at {measure.corner.time:.1f} s"))
+    if measure.pass_time is not None and measure.min_distance is not None:
+        facts.append(("nearest pass", f"nearest pass {measure.min_distance:.1f} m, at {measure.pass_time:.1f} s"))
     if measure.overshoot is not None:
         facts.append(("overshoot", f"overshoot {measure.overshoot:.1f} m"))
-    if measure.corner is not None and measure.corner.overrun:
-        facts.append(
-            ("overrun", f"passed {measure.corner.overrun:.0f} m beyond the end of the next leg, which was not joined")
-        )
+    if measure.overrun:
+        overrun_text = f"passed {measure.overrun:.0f} m beyond the end of the next leg, which was not joined"
+        facts.append(("overrun", overrun_text))
     if measure.settled_distance is not None and measure.is_complete:
         facts.append(("settled", f"settled to {measure.settled_distance:.2f} m from the next leg"))
     return facts
@@ -254,7 +254,7 @@ def _flown_faults(
                 f" {min_radius:.0f} m) passes the waypoint {min_distance:.1f} m away",
             )
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
-        passed_text = "its arc" if measure.corner is None else "its next leg"
+        passed_text = "its arc" if measure.pass_time is None else "its next leg"
         faults["overshoot"] = message(
             f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
         )

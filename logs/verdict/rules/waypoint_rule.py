@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import acceptance_condition
+from logs.verdict.measures.acceptance import acceptance_limit, position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
 from logs.verdict.rule import Rule
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
+from logs.verdict.tolerances import CORNER_CUT_TOLERANCE_M, EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text
 from world.arrays import Floats
 
@@ -39,7 +39,7 @@ def waypoint_findings(
 
 def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
     """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
-    condition = acceptance_condition(requirements, waypoint)
+    limit, source = acceptance_limit(requirements, waypoint)
     offset = float(requirements.fly_by_offset[waypoint])
     faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
     autopilot = requirements.setup.autopilot
@@ -47,22 +47,22 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         fact = "flown over"
     elif not autopilot.turns.follows_path:
         # Without fly-by arcs, the autopilot turns at a distance before the waypoint.
-        turn_distance, unread_text = condition.radius, ""
-        if condition.source == "mission" and not autopilot.turns.reads_acceptance:
+        turn_distance, unread_text = limit, ""
+        if source == "mission" and not autopilot.turns.reads_acceptance:
             turn = abs(float(requirements.turns[waypoint])) if 0 < waypoint < requirements.legs else math.pi
             turn_distance = autopilot.turns.distance(turn, float(requirements.points[waypoint, 2]))
-            unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
+            unread_text = f"; {autopilot.title} does not read the mission's {limit:.0f} m"
         fact = (
             f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before the waypoint, or once the aircraft"
             f" has passed the waypoint{unread_text}"
         )
-    elif offset > condition.radius + ROUNDING_M:
+    elif offset > limit + ROUNDING_M:
         turn = math.degrees(abs(float(requirements.turns[waypoint])))
         radius = float(requirements.radius[waypoint])
         faults.append(
             message(
                 f"the arc of the {turn:.0f}° corner passes the waypoint {offset:.0f} m away",
-                f" (radius {radius:.0f} m); the waypoint counts as reached within {condition.radius:.0f} m",
+                f" (radius {radius:.0f} m); the waypoint counts as reached within {limit:.0f} m",
             )
         )
     return make_finding(
@@ -72,10 +72,10 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         reason=finding_reason(faults) if faults else fact,
         faults=faults,
         planned=offset,
-        limit=round(condition.radius, 3),
-        source=condition.source,
+        limit=round(limit, 3),
+        source=source,
         tolerance=ROUNDING_M,
-        margin=condition.radius - offset if autopilot.turns.follows_path else None,
+        margin=limit - offset if autopilot.turns.follows_path else None,
         unit="m",
         method="the fly-by arc",
     )
@@ -90,8 +90,12 @@ def _flown_finding(
 
     apexes: points of the planned path nearest to the waypoints, m, (w, 3).
     """
-    condition, setup = acceptance_condition(requirements, waypoint), requirements.setup
-    offset, max_distance = float(requirements.fly_by_offset[waypoint]), condition.radius + condition.tolerance
+    setup, (limit, source) = requirements.setup, acceptance_limit(requirements, waypoint)
+    # The limit of an autopilot that follows the path already includes a margin.
+    tolerance = 0.0
+    if source in ("mission", "autopilot"):
+        tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
+    offset, max_distance = float(requirements.fly_by_offset[waypoint]), limit + tolerance
     distance, reason = math.nan, "not reached: nothing was flown"
     ok: bool | None = None
     facts: tuple[Fact, ...] = ()
@@ -128,12 +132,10 @@ def _flown_finding(
                 distance, ok, facts = math.nan, None, ()
                 reason = f"not reached: the flight ended on {place_text(last_leg)}"
         elif not ok:
-            owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
-                condition.source, "the fly-by path's"
-            )
+            owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(source, "the fly-by path's")
             purpose = RULE_WORDS["waypoint"].tolerance_purpose
-            error_text = f" plus {condition.tolerance:.1f} m for {purpose}" if condition.tolerance else ""
-            condition_text = f"the waypoint counts as reached within {condition.radius:.0f} m ({owner} radius)"
+            error_text = f" plus {tolerance:.1f} m for {purpose}" if tolerance else ""
+            condition_text = f"the waypoint counts as reached within {limit:.0f} m ({owner} radius)"
             reason = f"missed: {reason}; {condition_text}{error_text}"
     return make_finding(
         "waypoint",
@@ -143,11 +145,11 @@ def _flown_finding(
         faults=faults,
         planned=offset,
         flown=distance,
-        limit=round(condition.radius, 3),
-        source=condition.source,
-        tolerance=condition.tolerance,
+        limit=round(limit, 3),
+        source=source,
+        tolerance=tolerance,
         # A waypoint reached by crossing its line has no margin, nor does one that was not reached.
-        margin=condition.radius - distance if ok is (distance <= max_distance) and not faults else None,
+        margin=limit - distance if ok is (distance <= max_distance) and not faults else None,
         unit="m",
         method="closest approach, horizontal",
         facts=facts,
@@ -183,7 +185,7 @@ def explain_by_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Add to each failed finding's reason the circles that the autopilot flew at its waypoints."""
-    circles = [] if aligned is None else waypoint_circles(requirements, aligned)
+    circles = {} if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)
     legs_of_lines = {
@@ -204,7 +206,7 @@ def explain_by_circles(
             # The first waypoint that was not passed, and the one before it, at which the aircraft may still circle.
             last = int(np.argmin(aligned.passed))
             waypoints = range(last - 1, last + 1)
-        text = circles_text(requirements, [circle for circle in circles if circle.waypoint in waypoints])
+        text = circles_text(requirements, {index: circles[index] for index in waypoints if index in circles})
         explained.append(replace(finding, reason=f"{finding.reason}; {text}") if text else finding)
     return tuple(explained)
 

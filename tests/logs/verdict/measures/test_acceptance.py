@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from logs.verdict.measures.acceptance import (
-    acceptance_condition,
+    acceptance_limit,
     corner_depths,
     corridor_limit,
     farthest_from_legs,
@@ -25,12 +25,11 @@ RIGHT_ANGLE = [[0, 0, 300], [0, 3000, 300], [3000, 3000, 300], [6000, 3000, 300]
 def test_a_stated_radius_comes_before_the_paths_own() -> None:
     setup = make_setup(RIGHT_ANGLE, fly_over=(2,))
     own = bank_radius() * (math.sqrt(2.0) - 1.0)
-    found = [acceptance_condition(route_requirements(setup), i) for i in range(4)]
-    assert [item.radius for item in found] == pytest.approx([10.0, own + 10.0, 10.0, 10.0])
-    assert [item.source for item in found] == ["fly-by path", "fly-by path", "fly-over", "fly-by path"]
+    radii, sources = zip(*(acceptance_limit(route_requirements(setup), i) for i in range(4)), strict=True)
+    assert radii == pytest.approx([10.0, own + 10.0, 10.0, 10.0])
+    assert sources == ("fly-by path", "fly-by path", "fly-over", "fly-by path")
     stated = replace(setup, route=setup.route.with_fields(acceptance_radius=np.array([0.0, 25.0, 7.0, 0.0])))
-    found = [acceptance_condition(route_requirements(stated), i) for i in range(4)]
-    assert [(item.radius, item.source) for item in found[1:3]] == [(25.0, "mission"), (7.0, "mission")]
+    assert [acceptance_limit(route_requirements(stated), i) for i in (1, 2)] == [(25.0, "mission"), (7.0, "mission")]
 
 
 def test_navigation_is_off_by_three_standard_deviations() -> None:

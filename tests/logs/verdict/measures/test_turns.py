@@ -10,7 +10,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.measures.turns import NEXT_LEG_FRACTION, TurnMeasure, WaypointPass, measure_passes, measure_turn
+from logs.verdict.measures.turns import NEXT_LEG_FRACTION, TurnMeasure, measure_turn, measure_turns
 from tests.soak import some
 from tests.synthetic import bank_radius, bump, copied, edited, fly_path, make_setup, waypoint_stations
 
@@ -155,8 +155,8 @@ Place = tuple[float, float]
 ROUTE: tuple[Place, ...] = ((0.0, 0.0), (0.0, 2000.0), (1000.0, 2000.0), (1000.0, 4000.0))
 
 
-def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[WaypointPass, ...]:
-    """Of a flight along straight lines from place to place."""
+def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> list[TurnMeasure]:
+    """The turns of a flight along straight lines from place to place."""
     setup = make_setup([(east, north, 300.0) for east, north in route])
     track = fly_path(setup)
     way = np.array(flown)
@@ -167,25 +167,24 @@ def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[Wayp
     requirements = route_requirements(setup)
     aligned = align_track(requirements, edited(track, position=position))
     assert aligned is not None
-    return measure_passes(requirements, aligned)
+    return measure_turns(requirements, aligned, follows_arcs=False)
 
 
 def test_a_flight_over_the_corners_overshoots_none() -> None:
     found = passes(ROUTE)
-    assert [one.distance for one in found] == pytest.approx([0.0] * 4, abs=0.3)
-    assert [one.overshoot for one in found[1:-1]] == pytest.approx([0.0, 0.0], abs=0.3)
-    assert (found[0].overshoot, found[-1].overshoot) == (None, None)
+    assert [one.min_distance for one in found] == pytest.approx([0.0, 0.0], abs=0.3)
+    assert [one.overshoot for one in found] == pytest.approx([0.0, 0.0], abs=0.3)
 
 
 def test_how_far_past_the_new_leg_a_flight_went() -> None:
     """80 m too far north, back on the leg 400 m along it."""
     found = passes([(0.0, 0.0), (0.0, 2080.0), (400.0, 2000.0), *ROUTE[2:]])
-    assert found[1].overshoot == pytest.approx(80.0, abs=0.5)
-    assert found[1].distance == pytest.approx(0.0, abs=0.3)
+    assert found[0].overshoot == pytest.approx(80.0, abs=0.5)
+    assert found[0].min_distance == pytest.approx(0.0, abs=0.3)
     # Cut inside, the other side is none.
     inside = passes([(0.0, 0.0), (0.0, 1900.0), (400.0, 1920.0), (600.0, 2000.0), *ROUTE[2:]])
-    assert inside[1].overshoot == 0.0
-    assert inside[1].distance == pytest.approx(100.0, abs=0.5)
+    assert inside[0].overshoot == 0.0
+    assert inside[0].min_distance == pytest.approx(100.0, abs=0.5)
 
 
 @pytest.mark.parametrize(("peak", "counts"), [(NEXT_LEG_FRACTION - 0.03, True), (NEXT_LEG_FRACTION + 0.15, False)])
@@ -193,29 +192,31 @@ def test_only_the_first_part_of_the_next_leg_is_looked_at(peak: float, counts: b
     """A bulge of 50 m whose foot is 50 m before it, and 100 m after."""
     top = 1000.0 * peak
     found = passes([*ROUTE[:2], (top - 50.0, 2000.0), (top, 2050.0), (top + 100.0, 2000.0), *ROUTE[2:]])
-    assert found[1].overshoot == pytest.approx(50.0 if counts else 0.0, abs=0.5)
+    assert found[0].overshoot == pytest.approx(50.0 if counts else 0.0, abs=0.5)
 
 
 def test_the_look_ends_at_the_very_place_between_rows() -> None:
     """On a way that leaves the next leg by 0.1 m a metre that is 70 m at seven tenths of it."""
     found = passes([*ROUTE[:2], (1000.0, 2100.0), ROUTE[3]])
-    assert found[1].overshoot == pytest.approx(0.1 * NEXT_LEG_FRACTION * 1000.0, abs=1e-6)
+    assert found[0].overshoot == pytest.approx(0.1 * NEXT_LEG_FRACTION * 1000.0, abs=1e-6)
 
 
 def test_each_pass_comes_after_the_one_before() -> None:
     """A route that goes out and back: the flight is as near to its third place on the way out."""
     back: tuple[Place, ...] = ((0.0, 0.0), (0.0, 2000.0), (300.0, 2000.0), (300.0, 0.0))
     found = passes([(0.0, 0.0), (100.0, 2000.0), (300.0, 2000.0), (300.0, 0.0)], back)
-    times = [one.time for one in found]
-    assert times == sorted(times)
-    assert [one.distance for one in found] == pytest.approx([0.0, 99.9, 0.0, 0.0], abs=0.3)
+    first_time, second_time = (one.pass_time for one in found)
+    assert first_time is not None
+    assert second_time is not None
+    assert first_time < second_time
+    assert [one.min_distance for one in found] == pytest.approx([99.9, 0.0], abs=0.3)
 
 
 def test_a_leg_that_was_cut_off_is_not_joined() -> None:
     """Past the second waypoint the aircraft is already 200 m beyond the short leg's end."""
     short: tuple[Place, ...] = ((0.0, 0.0), (0.0, 2000.0), (50.0, 2000.0), (2000.0, 2000.0))
     found = passes([(0.0, 0.0), (250.0, 1800.0), (250.0, 2000.0), (2000.0, 2000.0)], short)
-    assert found[1].overshoot is None
+    assert found[0].overshoot is None
     # The nearest place of the first straight to (0, 2000) is its end, or on the next.
-    assert found[1].distance == pytest.approx(250.0, abs=1.0)
-    assert found[1].overrun == pytest.approx(200.0, abs=1.0)
+    assert found[0].min_distance == pytest.approx(250.0, abs=1.0)
+    assert found[0].overrun == pytest.approx(200.0, abs=1.0)
