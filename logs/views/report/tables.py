@@ -202,7 +202,8 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     )
     limits_text = (
         f"turn {max_turn}, climb {max_climb}, dive {max_dive};"
-        f" {format_quantity(limits.min_clearance_m, 'm')} above ground; within {format_quantity(setup.corridor, 'm')} of the legs"
+        f" {format_quantity(limits.min_clearance_m, 'm')} above ground;"
+        f" within {format_quantity(setup.corridor, 'm')} of the legs"
     )
     wind_text = f"{format_quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
     if wind.gradient:
