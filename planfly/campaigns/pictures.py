@@ -151,7 +151,7 @@ def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float 
 
 
 def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
-    """Draw the fraction of flyable flights against wind speed, with its interval and number of flights.
+    """Draw the fraction of flyable flights against wind speed, with its interval and the numbers of flights.
 
     target: required probability, drawn as a line, or None.
     bins: flights by ranges of wind speed, see `group_by_speed`.
@@ -162,18 +162,13 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         centres = [0.5 * (speed_bin.low + speed_bin.high) for speed_bin in bins]
         fractions = [speed_bin.flyable / speed_bin.flights for speed_bin in bins]
         for speed_bin, centre, fraction in zip(bins, centres, fractions, strict=True):
-            axes.fill_between(
-                [speed_bin.low, speed_bin.high],
-                speed_bin.interval.low,
-                speed_bin.interval.high,
-                color=PLANNED,
-                alpha=0.35,
-                linewidth=0.0,
-            )
-            axes.plot([speed_bin.low, speed_bin.high], [fraction, fraction], color=BLUE, linewidth=2.0)
+            # The interval is a thin bar, because a band of few flights would dominate the fraction itself.
+            interval = speed_bin.interval
+            axes.vlines(centre, interval.low, interval.high, color=PLANNED, linewidth=1.5)
+            axes.plot([speed_bin.low, speed_bin.high], [fraction, fraction], color=BLUE, linewidth=3.5)
             axes.annotate(
-                f"{speed_bin.flights}",
-                (centre, 0.0),
+                f"{speed_bin.flyable}/{speed_bin.flights}",
+                (centre, -0.10),
                 xytext=(0, 3),
                 textcoords="offset points",
                 ha="center",
@@ -192,11 +187,11 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
                 color=INK_COLOUR,
                 fontsize=8,
             )
-        axes.set_ylim(-0.02, 1.05)
+        axes.set_ylim(-0.10, 1.05)
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
         axes.set_title(
-            "Probability against wind speed (line: share of flyable flights; band: Wilson interval; numbers: flights)"
+            "Flyable flights against wind speed (line: their share; bar: its Wilson interval; below: flyable/flown)"
         )
         # A grid behind the data, and no top and right edge of the axes.
         axes.grid(visible=True, color=GRID_COLOUR, linewidth=0.6)
