@@ -196,7 +196,7 @@ export class Panel {
     const whole = ["flight", "mission", "plan"].includes(one.place.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.place.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
     return element("li", { "data-state": one.state },
-      element("p", {}, element("span", { class: "rule" }, one.title), " ", place), element("p", { class: "reason" }, one.reason),
+      element("p", {}, element("span", { class: "rule" }, one.title), " ", place), element("p", { class: "reason" }, one.reason, one.ok && one.passes ? element("small", {}, ` (limit ${one.passes})`) : null),
       offers.length ? element("ul", { class: "suggestions" }, ...offers) : null);
   }
 
