@@ -531,8 +531,29 @@ def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspee
 
     path, waypoints: reference path, and `WAYPOINT` records of the route, (w,).
     airspeeds: airspeed on each leg, m/s.
+
+    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires. It
+    then flies one more lap until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing,
+    because no time limit would be long enough.
     """
-    length = path.length + _extra_loiter_length(setup, waypoints)
+    extra_lengths = dict[int, float]()
+    circles = waypoints[(waypoints["loiter_radius"] != 0.0) & setup.autopilot.loiters.steers_to_center]
+    # Process waypoints of one loiter that agree in these fields only once.
+    first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
+    for waypoint in circles[first_indices]:
+        stated_radius, altitude = abs(float(waypoint["loiter_radius"])), float(waypoint["up"])
+        flown_radius = max(
+            setup.limits.turn_radius(course, course + math.pi, altitude, float(waypoint["airspeed"]))
+            for course in (0.0, math.pi)
+        )
+        # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
+        flown_radius *= eas_to_tas_ratio(altitude) ** 2
+        if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
+            extra_length = (
+                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)
+            )
+            extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
+    length = path.length + sum(extra_lengths.values())
     # The lowest ground speed on any leg in the mean wind; a default if no leg can be flown.
     positions, courses = setup.route.positions, leg_courses(setup.route.positions)
     tables = {airspeed: setup.limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
@@ -561,38 +582,6 @@ def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspee
     if waypoints["is_mission_end"][-1]:
         time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
     return time_limit
-
-
-def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return the extra length flown in loiters whose radius is too small for the bank limit, m.
-
-    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires. It
-    then flies one more lap until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing,
-    because no time limit would be long enough.
-
-    waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    """
-    if not setup.autopilot.loiters.steers_to_center:
-        return 0.0
-    extra_lengths = dict[int, float]()
-    circles = waypoints[waypoints["loiter_radius"] != 0.0]
-    # Process waypoints of one loiter that agree in these fields only once.
-    first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
-    for waypoint in circles[first_indices]:
-        stated_radius = abs(float(waypoint["loiter_radius"]))
-        speed = float(waypoint["airspeed"])
-        altitude = float(waypoint["up"])
-        flown_radius = max(
-            setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
-        )
-        # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
-        flown_radius *= eas_to_tas_ratio(altitude) ** 2
-        if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
-            extra_length = (
-                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)
-            )
-            extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
-    return sum(extra_lengths.values())
 
 
 def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
@@ -815,7 +804,9 @@ class Flight(RunningFlight):
             return partial(self._law.loop, workspace.block, self._ground.heights, *model.arrays)
         # Do not set gusts in still air, nor the altitude of unknown ground.
         is_used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
-        setters = [setter if use else _discard for setter, use in zip(access.setters, is_used, strict=True)]
+        setters = [
+            setter if use else (lambda _value: None) for setter, use in zip(access.setters, is_used, strict=True)
+        ]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
@@ -824,10 +815,6 @@ class Flight(RunningFlight):
             access.run,
             self._steps,
         )
-
-
-def _discard(_value: float) -> None:
-    """Do nothing; stands for the setter of an output that the flight does not use."""
 
 
 @dataclass(frozen=True, slots=True)

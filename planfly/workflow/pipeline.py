@@ -29,8 +29,7 @@ from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, explain_verdict
-from planfly.workflow.suggestion_trials import with_tried_suggestions
-from planfly.workflow.trial_flight import predicted_seconds
+from planfly.workflow.suggestion_trials import predicted_seconds, with_tried_suggestions
 from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
 from world.errors import FlightError, PlanflyError, StartError
