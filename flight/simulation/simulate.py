@@ -356,7 +356,7 @@ class RunningFlight:
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
         gear: Gear | None = None,
     ) -> None:
-        """Load the aircraft, and find the start of the route.
+        """Load the aircraft, find the start of the route, and start the wind and the navigation error.
 
         local_map: local map of the setup, if another flight has already fitted one.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
@@ -399,6 +399,18 @@ class RunningFlight:
             wind=_find_wind(setup, (east, north, up), convergence),
             ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
         )
+        # The mean wind, and the random streams of turbulence and navigation error.
+        wind, record, w20 = setup.scenario.wind, self._work, W20[setup.scenario.wind.turbulence]
+        cos, sin = math.cos(wind.to_course), math.sin(wind.to_course)
+        record.wind = (wind.speed, cos, sin, wind.gradient, wind.reference_amsl, w20, 0.0)
+        self._windy = bool(wind.speed or wind.gradient or w20 or wind.field)
+        self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
+        start_gusts(self._random.standard_normal(5), record.gusts)
+        sigma, time_constant = ERRORS[setup.nav]
+        record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
+        self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
+        if self._navigation_random is not None:
+            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
 
     def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Create the workspace of the compiled loop for a route, and set the flight's time limit.
@@ -442,29 +454,6 @@ class RunningFlight:
     def distance(self) -> float:
         """Distance flown along the path, m."""
         return min(float(self.guidance_memory.distance), self.path.length)
-
-    def _start_disturbances(self, setup: FlightSetup) -> None:
-        """Set the mean wind, and start turbulence and navigation error from their random streams."""
-        wind, record = setup.scenario.wind, self._work
-        wind_course = wind.to_course
-        w20 = W20[wind.turbulence]
-        record.wind = (
-            wind.speed,
-            math.cos(wind_course),
-            math.sin(wind_course),
-            wind.gradient,
-            wind.reference_amsl,
-            w20,
-            0.0,
-        )
-        self._windy = bool(wind.speed or wind.gradient or w20 or wind.field)
-        self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
-        start_gusts(self._random.standard_normal(5), record.gusts)
-        sigma, time_constant = ERRORS[setup.nav]
-        record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
-        self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
-        if self._navigation_random is not None:
-            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
 
     def _start_trimmed(
         self,
@@ -741,7 +730,6 @@ class Flight(RunningFlight):
         memory.last_airspeed, memory.stall_speed = -1.0, aircraft.stall_speed
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
-        self._start_disturbances(setup)
         # The compiled model flies only if its steps equal those of JSBSim.
         self._compiled: CompiledModel | None = None
         if (engine or setup.engine) == "jsbsim":

@@ -252,7 +252,6 @@ class SitlFlight(ProgramFlight):
             release_start = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
             self._start_trimmed(setup.mission.source, release_start)
             self._rail = rail_end(self.fdm.read(), start.wind)
-        self._start_disturbances(setup)
         self._mission = make_uploaded_mission(setup)
         if self._law is not None:
             self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
