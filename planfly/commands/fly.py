@@ -72,8 +72,7 @@ def fly(args: argparse.Namespace) -> int:
 
 def _json_answer(mission: str, flight: "FlownMission", code: int) -> object:
     """Return the answer of ``planfly fly`` for --json."""
-    from planfly.terminal.answers import FlyAnswer
-    from planfly.terminal.verdict_answers import count_returns
+    from planfly.terminal.verdict_answers import FlyAnswer, count_returns
 
     return FlyAnswer(
         exit_code=code,
