@@ -416,7 +416,8 @@ def apply_options(
     if forecast is not None:
         # With the time of flight first, so that the file is read once, for this time.
         scenario = without_forecast(scenario)
-    _check_aircraft_options(scenario, options)
+    if options.get("aircraft") is not None or options.get("airspeed") is not None:
+        _check_aircraft_options(scenario, options)
     new_scenario = with_flight_time(scenario, options.get("at"))
     entries = flight_entries(options, program)
     if any(value is not None for value in entries.values()):

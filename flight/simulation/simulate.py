@@ -356,7 +356,7 @@ class RunningFlight:
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
         gear: Gear | None = None,
     ) -> None:
-        """Load the aircraft, and find the start of the route.
+        """Load the aircraft, find the start of the route, and start the wind and the navigation error.
 
         local_map: local map of the setup, if another flight has already fitted one.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
@@ -399,6 +399,18 @@ class RunningFlight:
             wind=_find_wind(setup, (east, north, up), convergence),
             ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
         )
+        # The mean wind, and the random streams of turbulence and navigation error.
+        wind, record, w20 = setup.scenario.wind, self._work, W20[setup.scenario.wind.turbulence]
+        cos, sin = math.cos(wind.to_course), math.sin(wind.to_course)
+        record.wind = (wind.speed, cos, sin, wind.gradient, wind.reference_amsl, w20, 0.0)
+        self._windy = bool(wind.speed or wind.gradient or w20 or wind.field)
+        self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
+        start_gusts(self._random.standard_normal(5), record.gusts)
+        sigma, time_constant = ERRORS[setup.nav]
+        record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
+        self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
+        if self._navigation_random is not None:
+            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
 
     def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Create the workspace of the compiled loop for a route, and set the flight's time limit.
@@ -442,29 +454,6 @@ class RunningFlight:
     def distance(self) -> float:
         """Distance flown along the path, m."""
         return min(float(self.guidance_memory.distance), self.path.length)
-
-    def _start_disturbances(self, setup: FlightSetup) -> None:
-        """Set the mean wind, and start turbulence and navigation error from their random streams."""
-        wind, record = setup.scenario.wind, self._work
-        wind_course = wind.to_course
-        w20 = W20[wind.turbulence]
-        record.wind = (
-            wind.speed,
-            math.cos(wind_course),
-            math.sin(wind_course),
-            wind.gradient,
-            wind.reference_amsl,
-            w20,
-            0.0,
-        )
-        self._windy = bool(wind.speed or wind.gradient or w20 or wind.field)
-        self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
-        start_gusts(self._random.standard_normal(5), record.gusts)
-        sigma, time_constant = ERRORS[setup.nav]
-        record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
-        self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
-        if self._navigation_random is not None:
-            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
 
     def _start_trimmed(
         self,
@@ -531,8 +520,29 @@ def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspee
 
     path, waypoints: reference path, and `WAYPOINT` records of the route, (w,).
     airspeeds: airspeed on each leg, m/s.
+
+    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires. It
+    then flies one more lap until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing,
+    because no time limit would be long enough.
     """
-    length = path.length + _extra_loiter_length(setup, waypoints)
+    extra_lengths = dict[int, float]()
+    circles = waypoints[(waypoints["loiter_radius"] != 0.0) & setup.autopilot.loiters.steers_to_center]
+    # Process waypoints of one loiter that agree in these fields only once.
+    first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
+    for waypoint in circles[first_indices]:
+        stated_radius, altitude = abs(float(waypoint["loiter_radius"])), float(waypoint["up"])
+        flown_radius = max(
+            setup.limits.turn_radius(course, course + math.pi, altitude, float(waypoint["airspeed"]))
+            for course in (0.0, math.pi)
+        )
+        # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
+        flown_radius *= eas_to_tas_ratio(altitude) ** 2
+        if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
+            extra_length = (
+                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)
+            )
+            extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
+    length = path.length + sum(extra_lengths.values())
     # The lowest ground speed on any leg in the mean wind; a default if no leg can be flown.
     positions, courses = setup.route.positions, leg_courses(setup.route.positions)
     tables = {airspeed: setup.limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
@@ -561,38 +571,6 @@ def _time_limit(setup: FlightSetup, path: FlyByPath, waypoints: Records, airspee
     if waypoints["is_mission_end"][-1]:
         time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
     return time_limit
-
-
-def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return the extra length flown in loiters whose radius is too small for the bank limit, m.
-
-    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires. It
-    then flies one more lap until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing,
-    because no time limit would be long enough.
-
-    waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    """
-    if not setup.autopilot.loiters.steers_to_center:
-        return 0.0
-    extra_lengths = dict[int, float]()
-    circles = waypoints[waypoints["loiter_radius"] != 0.0]
-    # Process waypoints of one loiter that agree in these fields only once.
-    first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
-    for waypoint in circles[first_indices]:
-        stated_radius = abs(float(waypoint["loiter_radius"]))
-        speed = float(waypoint["airspeed"])
-        altitude = float(waypoint["up"])
-        flown_radius = max(
-            setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
-        )
-        # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
-        flown_radius *= eas_to_tas_ratio(altitude) ** 2
-        if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
-            extra_length = (
-                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)
-            )
-            extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
-    return sum(extra_lengths.values())
 
 
 def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
@@ -752,7 +730,6 @@ class Flight(RunningFlight):
         memory.last_airspeed, memory.stall_speed = -1.0, aircraft.stall_speed
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
-        self._start_disturbances(setup)
         # The compiled model flies only if its steps equal those of JSBSim.
         self._compiled: CompiledModel | None = None
         if (engine or setup.engine) == "jsbsim":
@@ -815,7 +792,9 @@ class Flight(RunningFlight):
             return partial(self._law.loop, workspace.block, self._ground.heights, *model.arrays)
         # Do not set gusts in still air, nor the altitude of unknown ground.
         is_used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
-        setters = [setter if use else _discard for setter, use in zip(access.setters, is_used, strict=True)]
+        setters = [
+            setter if use else (lambda _value: None) for setter, use in zip(access.setters, is_used, strict=True)
+        ]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
@@ -824,10 +803,6 @@ class Flight(RunningFlight):
             access.run,
             self._steps,
         )
-
-
-def _discard(_value: float) -> None:
-    """Do nothing; stands for the setter of an output that the flight does not use."""
 
 
 @dataclass(frozen=True, slots=True)

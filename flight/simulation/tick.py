@@ -2,9 +2,9 @@
 
 A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`);
 then an autopilot's control law fills in the commands; the tick ends with the next wind, a row of the track and the
-outputs to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, which consists of these two parts and
-its control law, and a compiled loop of such ticks, which reads the state (`read_state`) and steps the compiled model
-(`advance_model`).
+outputs to JSBSim (`end_tick`), and in the air `airborne_end_code` decides when the flight ends. Every autopilot has a
+compiled tick of its own, which consists of these parts and its control law, and a compiled loop of such ticks, which
+reads the state (`read_state`) and steps the compiled model (`advance_model`).
 """
 
 import math
@@ -258,31 +258,11 @@ _OUTPUT_FIELDS = field_names(OUTPUT)
 
 @inner
 def begin_tick(workspace: Record, heights: Heights) -> bool:
-    """Convert the state from JSBSim's units, and estimate the motion; return False if the state is not finite.
+    """Convert the state to SI units and map axes, look up the ground, and estimate the motion.
 
-    workspace: a record of `WORKSPACE`.
-    heights: altitudes of the terrain.
-    """
-    settings, timing = workspace.settings, workspace.timing
-    if not _read_sensors(workspace, heights):
-        return False
-    estimate_motion(
-        workspace.true,
-        workspace.estimated,
-        workspace.navigation,
-        workspace.noise[timing.row].navigation,
-        settings.navigation_sigma,
-        settings.navigation_time,
-        timing.dt,
-    )
-    return True
+    Return False if a value of the state is not finite.
 
-
-@inner
-def _read_sensors(workspace: Record, heights: Heights) -> bool:
-    """Convert the state to SI units and map axes, and look up the ground; return False if a value is not finite.
-
-    workspace: a record of `WORKSPACE`; its fields ``state``, ``true`` and ``place`` are set.
+    workspace: a record of `WORKSPACE`; its fields ``state``, ``true``, ``place`` and ``estimated`` are set.
     heights: altitudes of the terrain, m, (rows, columns).
     """
     state = workspace.state
@@ -290,6 +270,7 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
     air = workspace.air
     settings = workspace.settings
     place = workspace.place
+    timing = workspace.timing
     if not _to_si(state, workspace.state_factors):
         return False
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
@@ -309,36 +290,20 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
     place.north_cos, place.north_sin = cos, sin
     place.ground = pixel_height(heights, column, row)
     place.clearance = true.up - place.ground
+    estimate_motion(
+        true,
+        workspace.estimated,
+        workspace.navigation,
+        workspace.noise[timing.row].navigation,
+        settings.navigation_sigma,
+        settings.navigation_time,
+        timing.dt,
+    )
     return True
 
 
 @inner
-def end_tick(workspace: Record, block: Floats) -> int:
-    """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
-
-    block: block of the `Workspace`, which contains the wind field.
-
-    Return the code of the flight's end, a key of `ENDS`, or 0 if the flight continues.
-    """
-    fill_tick(workspace, block)
-    return airborne_end_code(workspace)
-
-
-@inner
-def airborne_end_code(workspace: Record) -> int:
-    """Return the code of the reason why an airborne flight ends in this tick, a key of `ENDS`; 0 if it continues."""
-    settings, air = workspace.settings, workspace.air
-    return _find_airborne_end(
-        workspace.state,
-        workspace.memory,
-        workspace.place.clearance,
-        settings.min_airspeed,
-        air.energy >= settings.battery,
-    )
-
-
-@inner
-def fill_tick(workspace: Record, block: Floats) -> None:
+def end_tick(workspace: Record, block: Floats) -> None:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
     block: block of the `Workspace`, which contains the wind field.
@@ -349,7 +314,6 @@ def fill_tick(workspace: Record, block: Floats) -> None:
     timing = workspace.timing
     place = workspace.place
     cos, sin = place.north_cos, place.north_sin
-    row = workspace.rows[timing.row]
     turbulence = workspace.noise[timing.row].turbulence
     wind, gusts, height = workspace.wind, workspace.gusts, place.clearance
     if workspace.settings.field > 0:
@@ -368,13 +332,32 @@ def fill_tick(workspace: Record, block: Floats) -> None:
         _update_wind(state, wind, gusts, turbulence, height, true.up, cos, sin, air, timing.dt)
     air.ground = place.ground if not math.isnan(place.ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0
-    _fill_row(
-        row, state, true, workspace.commands, workspace.memory, timing.tick * timing.dt, air.energy, place.clearance
-    )
-    _fill_wind(row, state, cos, sin)
+    _fill_row(workspace.rows[timing.row], workspace)
     timing.tick += 1
     timing.row += 1
     _set_output(workspace.output, workspace.commands, air, workspace.scale_positive, workspace.scale_negative)
+
+
+@inner
+def airborne_end_code(workspace: Record) -> int:
+    """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
+
+    The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
+    """
+    state, memory = workspace.state, workspace.memory
+    # The clearance is NaN over unknown ground.
+    if workspace.place.clearance <= 0.0:
+        return GROUND
+    if abs(state.roll) > LOSS_OF_CONTROL_BANK_RAD:
+        return END_OVERBANK
+    if state.airspeed < workspace.settings.min_airspeed:
+        return STALLED
+    if memory.is_finished:
+        is_near = memory.is_in_rtl or (
+            abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
+        )
+        return COMPLETED if is_near else END_MISSED_ROUTE
+    return END_BATTERY_EMPTY if workspace.air.energy >= workspace.settings.battery else 0
 
 
 @inner
@@ -448,32 +431,6 @@ def _to_si(state: Record, factors: Record) -> bool:
 
 
 @inner
-def _find_airborne_end(
-    state: Record, memory: Record, height_above_ground: float, min_airspeed: float, is_battery_empty: bool
-) -> int:
-    """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
-
-    state, memory: records of the workspace, with the aircraft's state and the progress along the route.
-    height_above_ground: m; NaN if unknown.
-    min_airspeed: airspeed below which control is lost, m/s.
-
-    The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
-    """
-    if height_above_ground <= 0.0:
-        return GROUND
-    if abs(state.roll) > LOSS_OF_CONTROL_BANK_RAD:
-        return END_OVERBANK
-    if state.airspeed < min_airspeed:
-        return STALLED
-    if memory.is_finished:
-        is_near = memory.is_in_rtl or (
-            abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
-        )
-        return COMPLETED if is_near else END_MISSED_ROUTE
-    return END_BATTERY_EMPTY if is_battery_empty else 0
-
-
-@inner
 def _set_output(output: Record, commands: Record, air: Record, scale_positive: Record, scale_negative: Record) -> None:
     """Set the values for JSBSim, in JSBSim's units: commands, mean wind plus gust, and ground altitude.
 
@@ -527,24 +484,11 @@ def _update_wind(
 
 
 @inner
-def _fill_row(
-    row: Record,
-    state: Record,
-    true: Record,
-    commands: Record,
-    memory: Record,
-    time: float,
-    energy: float,
-    clearance: float,
-) -> None:
-    """Fill a `flight.simulation.track.TRACK_ROW` record, except for the wind.
-
-    state, true, commands, memory: records of the workspace.
-    time: s since the start.
-    energy: Wh used since the start.
-    clearance: height above ground, m.
-    """
-    row.time = time
+def _fill_row(row: Record, workspace: Record) -> None:
+    """Fill a `flight.simulation.track.TRACK_ROW` record from a record of `WORKSPACE`, in map axes."""
+    state, true, memory = workspace.state, workspace.true, workspace.memory
+    commands, place = workspace.commands, workspace.place
+    row.time = workspace.timing.tick * workspace.timing.dt
     # Element by element: assigning a whole array would check shapes.
     position = row.position
     velocity = row.velocity
@@ -565,23 +509,15 @@ def _fill_row(
     commands_row[THROTTLE] = commands.throttle
     row.load_factor = state.load_factor
     row.current = state.current
-    row.energy = energy
+    row.energy = workspace.air.energy
     row.leg = memory.leg
     row.cross_track = memory.cross_track
     row.height_error = memory.height_error
     row.speed_command = memory.speed_command
-    row.clearance = clearance
-
-
-@inner
-def _fill_wind(row: Record, state: Record, convergence_cos: float, convergence_sin: float) -> None:
-    """Set the wind of a `flight.simulation.track.TRACK_ROW` record, in map axes.
-
-    convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
-    """
+    row.clearance = place.clearance
     wind = row.wind
-    wind[0] = state.wind_east * convergence_cos + state.wind_north * convergence_sin
-    wind[1] = state.wind_north * convergence_cos - state.wind_east * convergence_sin
+    wind[0] = state.wind_east * place.north_cos + state.wind_north * place.north_sin
+    wind[1] = state.wind_north * place.north_cos - state.wind_east * place.north_sin
     wind[2] = -state.wind_down
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from planfly.terminal.arguments import complete_aircraft, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import FLYABLE, CommandParser, LineParser
-from planfly.terminal.options import add_result_options, call_api
+from planfly.terminal.options import add_result_options, given_options
 from planfly.terminal.output import print_warnings, write_json_if_requested
 from world.errors import PlanflyError
 
@@ -154,7 +154,9 @@ def aircraft(args: argparse.Namespace) -> int:
         write_json_if_requested(args, lambda: _json_answer(embedded_aircraft))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"
-    numbers = call_api(aircraft_api.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
+    numbers = aircraft_api.describe_aircraft(
+        **given_options(args, aircraft_api.describe_aircraft, out=out, overwrite=args.overwrite or args.out is None)
+    )
     _print_numbers(numbers)
     print_warnings(numbers.lacking)
     for file in numbers.files:
@@ -187,7 +189,7 @@ def _make_folder(args: argparse.Namespace) -> int:
         if is_given:
             raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
     folder = Path(args.folder)
-    new_aircraft = call_api(aircraft_api.new_aircraft, args)
+    new_aircraft = aircraft_api.new_aircraft(**given_options(args, aircraft_api.new_aircraft))
     files = sorted(file.name for file in new_aircraft.folder.iterdir())
     folder_text = folder if folder.is_absolute() else f"./{folder}"
     has_sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
@@ -266,7 +268,7 @@ def _identify(args: argparse.Namespace) -> int:
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)
-    result = call_api(identifying.identify_aircraft, args, folder=args.out)
+    result = identifying.identify_aircraft(**given_options(args, identifying.identify_aircraft, folder=args.out))
     new_aircraft, estimate = result.aircraft, result.estimate
     files_made = sorted(file.name for file in new_aircraft.folder.iterdir())
     print(f"aircraft  {args.out} ({', '.join(files_made)}), from {estimate.seconds / 60.0:.1f} min of flight")

@@ -15,7 +15,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import write_error_if_requested, write_json_if_requested, write_suite_if_requested
 from planfly.workflow.output_paths import RESULTS
@@ -192,7 +192,9 @@ def campaign(args: argparse.Namespace) -> int:
             if target:
                 message = f"{option}: cannot be combined with --refly, which flies a single flight"
                 raise PlanflyError(message, field=option, value=target)
-        flight = call_api(campaigns.campaign_flight, args, index=args.refly, out=folder)
+        flight = campaigns.campaign_flight(
+            **given_options(args, campaigns.campaign_flight, index=args.refly, out=folder)
+        )
         row = flight.row
         print(f"flight {args.refly}: {row.outcome}, ended: {row.ended} (as in the campaign's table)")
         if row.undecided_text:
@@ -202,7 +204,7 @@ def campaign(args: argparse.Namespace) -> int:
         print(f"log       {flight.log}")
         return {"flyable": FLYABLE, "undecided": INCOMPLETE}.get(row.outcome, NOT_FLYABLE)
     with _report_stored_flights(args, folder, "campaign.sqlite") as interruption_code:
-        result = call_api(campaigns.campaign, args, out=folder)
+        result = campaigns.campaign(**given_options(args, campaigns.campaign, out=folder))
     if interruption_code():
         return interruption_code()
     from planfly.campaigns.summary import campaign_lines, campaign_suite
@@ -222,7 +224,7 @@ def winds(args: argparse.Namespace) -> int:
 
     folder = _result_folder(args, "winds")
     with _report_stored_flights(args, folder, "winds.sqlite") as interruption_code:
-        result = call_api(campaigns.winds, args, out=folder)
+        result = campaigns.winds(**given_options(args, out=folder))
     if interruption_code():
         return interruption_code()
     from planfly.campaigns.report import wind_lines, winds_suite

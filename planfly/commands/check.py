@@ -19,7 +19,7 @@ from planfly.terminal.options import (
     add_imported_log_options,
     add_result_options,
     add_world_options,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import print_warnings, write_json_if_requested, write_junit_if_requested
 from world.errors import ArgumentError
@@ -93,7 +93,7 @@ def check(args: argparse.Namespace) -> int:
             if (value := getattr(args, name)) not in (None, False):
                 allowed = "cannot be combined with --for, which flies with several autopilots"
                 raise ArgumentError.of_argument(name, value, allowed)
-        flights = call_api(flying.fly_by_each, args, mission=args.what)
+        flights = flying.fly_by_each(**given_options(args, flying.fly_by_each, mission=args.what))
         verdicts = {name: flight.verdict for name, flight in flights.items()}
         worst_code = max(verdict_code(verdict) for verdict in verdicts.values())
         write_json_if_requested(
@@ -107,7 +107,7 @@ def check(args: argparse.Namespace) -> int:
         write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
         print("\n".join(autopilot_lines(verdicts)))
         return worst_code
-    result = call_api(flying.judge, args)
+    result = flying.judge(**given_options(args, flying.judge))
     if not result.is_log:
         print_warnings(result.setup.scenario.notes)
     code, returns = INCOMPLETE if result.lossy else verdict_code(result.verdict), result.return_summary

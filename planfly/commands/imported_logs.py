@@ -13,7 +13,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_turbulence_option,
     add_world_options,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested, write_junit_if_requested
 from world.errors import PlanflyError
@@ -81,7 +81,7 @@ def import_log(args: argparse.Namespace) -> int:
         return FLYABLE
     if args.target is None:
         raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
-    flight = call_api(imported.import_log, args)
+    flight = imported.import_log(**given_options(args, imported.import_log))
     print(*verdict_lines(flight.verdict, flight.setup.route.notes), sep="\n")
     print(f"log       {Path(args.target)} ({count_text(len(flight.track), 'row')})")
     code = INCOMPLETE if flight.lossy else verdict_code(flight.verdict)
@@ -136,7 +136,7 @@ def refly(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")
-    result = call_api(imported.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
+    result = imported.refly(**given_options(args, log=log, out=folder, overwrite=args.overwrite or args.out is None))
     print("\n".join(result.lines))
     for file in result.files:
         print(f"refly     {file}")

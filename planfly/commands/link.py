@@ -13,7 +13,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -77,7 +77,7 @@ def link(args: argparse.Namespace) -> int:
     from logs.verdict.conditions import flown_lines, judging_conditions
     from planfly.api import linking
 
-    result = call_api(linking.link, args)
+    result = linking.link(**given_options(args))
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")

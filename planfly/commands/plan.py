@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     add_flights_option,
     add_result_options,
     add_scenario_argument,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import print_warnings, write_json_if_requested
 from planfly.workflow.output_paths import RUN_FOLDER, expand_path_pattern
@@ -118,15 +118,11 @@ def plan(args: argparse.Namespace) -> int:
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
     with _stop_on_interrupt() as should_stop:
-        new_plan = call_api(
-            planning.plan if args.old is None else planning.replan,
-            args,
-            budget=evaluations,
-            seconds=seconds,
-            out=out,
-            overwrite=args.overwrite or args.out is None,
-            stop=should_stop,
+        make_plan: Callable[..., Plan] = planning.plan if args.old is None else planning.replan
+        options = given_options(
+            args, make_plan, budget=evaluations, seconds=seconds, out=out, overwrite=args.overwrite or args.out is None
         )
+        new_plan = make_plan(**options, stop=should_stop)
     from planfly.api.planning import what_may_fail
 
     target = expand_path_pattern(out, new_plan.scenario.name, new_plan.seed)
@@ -155,14 +151,16 @@ def _plan_front(args: argparse.Namespace) -> int:
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as should_stop:
-        front = call_api(
-            fronts.plan_front,
-            args,
-            count=args.front,
-            seconds=seconds,
-            out=out,
-            overwrite=args.overwrite or args.out is None,
-            stop=should_stop,
+        front = fronts.plan_front(
+            **given_options(
+                args,
+                fronts.plan_front,
+                count=args.front,
+                seconds=seconds,
+                out=out,
+                overwrite=args.overwrite or args.out is None,
+                stop=should_stop,
+            )
         )
     default_plan = front.default.plan
     folder = expand_path_pattern(out, default_plan.scenario.name, default_plan.seed)

@@ -4,6 +4,7 @@ import argparse
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from planfly.terminal.options import (
     add_log_argument,
     add_result_options,
     add_vehicle_link_options,
-    call_api,
+    given_options,
     print_and_flush,
     watch_stop_signals,
 )
@@ -117,16 +118,18 @@ def replay(args: argparse.Namespace) -> int:
     if not to_station:
         args.end = args.to
     if to_station or args.foxglove:
-        play_log = replaying.play_to_stations if to_station else replaying.play_to_foxglove
+        play_log: Callable[..., None] = replaying.play_to_stations if to_station else replaying.play_to_foxglove
         with watch_stop_signals() as should_stop:
-            call_api(play_log, args, log=log, stop=should_stop, on_message=print_and_flush)
+            play_log(**given_options(args, play_log, log=log, stop=should_stop, on_message=print_and_flush))
     elif args.movie:
-        for file in call_api(replaying.movie, args, log=log, out=args.movie)[:3]:
+        for file in replaying.movie(**given_options(args, replaying.movie, log=log, out=args.movie))[:3]:
             print(f"movie     {file}")
     elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
         # Show frames until the end or an interruption; the last frame stays on the terminal.
         speed, lines = args.speed or 1.0, list[str]()
-        frames = call_api(replaying.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
+        frames = replaying.replay(
+            **given_options(args, replaying.replay, log=log, width=lambda: shutil.get_terminal_size().columns)
+        )
         screen = plain_stream(sys.stdout)
         print(_ENTER_SCREEN, end="", file=screen)
         try:
@@ -139,7 +142,7 @@ def replay(args: argparse.Namespace) -> int:
         print("\n".join(lines))
     else:
         # The timeline is printed at `--speed` times real time, or at once without it.
-        entries = call_api(replaying.timeline, args, log=log)
+        entries = replaying.timeline(**given_options(args, replaying.timeline, log=log))
         start, clock = args.start or float(log.track.time[0]), RunningClock()
         for entry in entries:
             while args.speed and (wait := (entry.time - start) / args.speed - clock()) > 0.0:
@@ -157,6 +160,10 @@ def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> objec
     from planfly.api import replaying
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
-    entries = replaying.timeline(log) if isinstance(args.to, str) else call_api(replaying.timeline, args, log=log)
+    entries = (
+        replaying.timeline(log)
+        if isinstance(args.to, str)
+        else replaying.timeline(**given_options(args, replaying.timeline, log=log))
+    )
     events = [TimelineEvent(time_s=entry.time, kind=entry.kind, text=entry.text) for entry in entries]
     return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)

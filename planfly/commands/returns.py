@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     add_sitl_option,
     add_steering_options,
     add_world_options,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -84,7 +84,7 @@ def returns(args: argparse.Namespace) -> int:
     from logs.verdict.conditions import flown_lines, judging_conditions
     from planfly.api import returning
 
-    result = call_api(returning.returns, args)
+    result = returning.returns(**given_options(args))
     code = FLYABLE if result.safe else INCOMPLETE if result.undecided else NOT_FLYABLE
     print(
         f"returns   {colour_text(result.headline, 'good' if result.safe else 'warning' if result.undecided else 'bad')}"

@@ -14,7 +14,7 @@ from planfly.terminal.options import (
     add_result_options,
     add_scenario_argument,
     add_terrain_option,
-    call_api,
+    given_options,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     from planner.plan import read_plan
 
     check_flights_option(args, "sitl")
-    result = call_api(running.run, args, on_round=_print_round)
+    result = running.run(**given_options(args, running.run, on_round=_print_round))
     if args.refine:
         print("rounds")
         for one in result.rounds:

@@ -9,7 +9,7 @@ from planfly.terminal.options import (
     add_steering_options,
     add_vehicle_link_options,
     add_world_options,
-    call_api,
+    given_options,
     print_and_flush,
     watch_stop_signals,
 )
@@ -61,5 +61,5 @@ def serve(args: argparse.Namespace) -> int:
     from planfly.api import serving
 
     with watch_stop_signals() as should_stop:
-        call_api(serving.serve, args, stop=should_stop, on_message=print_and_flush)
+        serving.serve(**given_options(args, stop=should_stop, on_message=print_and_flush))
     return FLYABLE

@@ -23,7 +23,7 @@ from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.reference_flights import find_passing_parameter
-from planfly.workflow.trial_flight import Trial
+from planfly.workflow.suggestion_trials import Trial
 from planfly.workflow.uav import Uav
 from world.errors import PlanflyError
 

@@ -12,7 +12,7 @@ from aircraft.catalog import Aircraft
 from logs.verdict.conditions import Conditions
 from logs.verdict.document import VerdictDocument
 from planfly.api.aircraft import AircraftNumbers
-from planfly.terminal.verdict_answers import STRICT, ReturnCounts
+from planfly.terminal.verdict_answers import STRICT
 
 # ----------------------------------------------------------------------
 # Answer of ``planfly aircraft`` with ``--json``.
@@ -358,25 +358,6 @@ class RunAnswer:
     verdict: VerdictDocument
     dispersed: DispersedFlights | None
     """Dispersed flights of the plan (--flights); null without this option or without a feasible plan."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
-class FlyAnswer:
-    """planfly fly: the log and the verdict."""
-
-    schema: Literal["planfly.fly/1"] = "planfly.fly/1"
-    exit_code: int
-    mission: str
-    headline: str
-    """The verdict in one line."""
-    seed: int
-    log: str | None
-    """Flight log; null if nothing was flown."""
-    autopilot_log: str | None
-    """Log that the autopilot program wrote; null if no program flew."""
-    warnings: list[str]
-    verdict: VerdictDocument
-    returns: ReturnCounts | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

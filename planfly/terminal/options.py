@@ -1,6 +1,6 @@
 """Add options that several commands share.
 
-The dest of an option is the matching keyword of the API, so that `call_api` passes it without further code.
+The dest of an option is the matching keyword of the API, so that `given_options` needs no table of names.
 """
 
 import argparse
@@ -9,7 +9,7 @@ import inspect
 import signal
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Any, TypeVar
+from typing import Any
 
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import (
@@ -25,21 +25,31 @@ from planfly.terminal.command_parser import CommandParser, OptionGroup
 from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
 
-_Result = TypeVar("_Result")
+# Options that only the terminal has; all others are keywords of the API.
+_TERMINAL_OPTIONS = ("command", "json", "junit", "quiet")
 
 
-def call_api(function: Callable[..., _Result], args: argparse.Namespace, **overrides: Any) -> _Result:
-    """Call a function of the API with the options that match its keywords, and return its result.
+def given_options(
+    args: argparse.Namespace, function: Callable[..., object] | None = None, /, **overrides: Any
+) -> dict[str, Any]:
+    """Return the given options of a command as keywords of the API.
 
-    An option that was not given (None) leaves its keyword at the default.
+    An option that was not given (None) is left out, so that its keyword keeps the default.
+
+    function: function of the API whose keywords are returned, for a command with options of several functions; None for
+        a command with one function.
     overrides: keywords that override the options.
 
-    >>> call_api(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
-    (3, 'here')
+    >>> given_options(argparse.Namespace(seed=3, out=None, json="-"), seed=4)
+    {'seed': 4}
+    >>> given_options(argparse.Namespace(seed=3, width=80), lambda *, seed: seed)
+    {'seed': 3}
     """
-    parameters = inspect.signature(function).parameters
-    options = {name: value for name, value in vars(args).items() if name in parameters} | overrides
-    return function(**{name: value for name, value in options.items() if value is not None})
+    options = {name: value for name, value in vars(args).items() if name not in _TERMINAL_OPTIONS}
+    if function is not None:
+        parameters = inspect.signature(function).parameters
+        options = {name: value for name, value in options.items() if name in parameters}
+    return {name: value for name, value in (options | overrides).items() if value is not None}
 
 
 # ----------------------------------------------------------------------

@@ -9,7 +9,7 @@ _ANSWERS = {
     "run": "RunAnswer",
     "plan": "plan_answers.PlanDocument",
     "export": "ExportAnswer",
-    "fly": "FlyAnswer",
+    "fly": "verdict_answers.FlyAnswer",
     "check": "verdict_answers.CheckDocument",
     "returns": "returns_answers.ReturnsAnswer",
     "link": "link_answers.LinkAnswer",

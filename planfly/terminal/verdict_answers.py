@@ -1,4 +1,4 @@
-"""Answer of `planfly check` with ``--json``: one verdict, or one for each of several autopilots."""
+"""Answers of `planfly fly` and `planfly check` with ``--json``, which contain verdicts."""
 
 import dataclasses
 from collections import Counter
@@ -35,6 +35,25 @@ def count_returns(summary: "ReturnSummary") -> ReturnCounts | None:
         return None
     kinds = [] if summary.returns is None else [ret.kind for ret in summary.returns.each]
     return ReturnCounts(line=summary.line, returns=len(kinds), outcomes=dict(Counter(kinds)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FlyAnswer:
+    """planfly fly: the log and the verdict."""
+
+    schema: Literal["planfly.fly/1"] = "planfly.fly/1"
+    exit_code: int
+    mission: str
+    headline: str
+    """The verdict in one line."""
+    seed: int
+    log: str | None
+    """Flight log; null if nothing was flown."""
+    autopilot_log: str | None
+    """Log that the autopilot program wrote; null if no program flew."""
+    warnings: list[str]
+    verdict: VerdictDocument
+    returns: ReturnCounts | None
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,7 @@
 """Make the `FlightSetup` of a plan or a mission file with the options of its flight, and its preflight notes."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from flight.autopilots.autopilot import Autopilot
-from flight.autopilots.parts import BatteryFailsafe, MissionDialect, RtlSettings, SpeedLimits
+from flight.autopilots.parts import RtlSettings
 from flight.mission.altitude_frames import find_misread_altitudes
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
@@ -174,17 +174,6 @@ def mission_of_plan(plan: Plan, uav: Uav, source: str = PLAN_FILE) -> Mission:
 _STORED_ITEMS = {"ardupilot": (724, "a Pixhawk with ArduPlane"), "px4": (500, "a flight controller with PX4")}
 
 
-def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, ...]:
-    """Note that a mission has more items than a common flight controller of the autopilot stores.
-
-    The result is empty otherwise.
-    """
-    limit, board = _STORED_ITEMS.get(dialect, (len(mission.items), ""))
-    if len(mission.items) <= limit:
-        return ()
-    return (f"{len(mission.items)} items: {board} stores {limit}, and refuses more",)
-
-
 def make_setup(
     scenario: Scenario,
     uav: Uav,
@@ -200,7 +189,8 @@ def make_setup(
 
     placed: the mission placed on the map of the scenario, if already computed.
     fdm_hz: step rate of JSBSim, Hz.  engine: flight model that flies.
-    Raises MissionError for a mission without a valid route, and for a fence without valid zones.
+    Raises MissionError for a mission without a valid route, and for a fence without valid zones; and ForecastError if
+    the route leaves the area, altitude levels or times of the wind's forecast.
     """
     if mission.fences:
         # A fence without valid zones could not be judged.
@@ -217,18 +207,26 @@ def make_setup(
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
-    _check_forecast(scenario, route, mission)
+    if (forecast := scenario.wind.forecast) is not None:
+        positions, file = route.positions, str(scenario.spec.wind.forecast)
+        latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
+        check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
+        duration = planned_duration(route, mission)
+        if duration > (forecast.last_time - forecast.departure).total_seconds():
+            allowed = (
+                f"the flight takes {duration / 60.0:.1f} min,"
+                f" but the forecast ends at {forecast.last_time:%Y-%m-%d %H:%M} UTC"
+            )
+            raise ForecastError.at(file, "time", f"{forecast.departure:%Y-%m-%d %H:%M} UTC", allowed)
     file_parameters, assumed_parameters = (
         {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
     )
     notes = autopilot.checks.parameter_notes
     notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
     notes += camera_notes(mission, route, scenario.wind, autopilot.speeds.true_airspeed_factor)
-    notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
-    notes += _item_count_notes(mission, autopilot.checks.dialect)
-    envelope, stated_battery = uav.limits.envelope, scenario.flight.battery_wh
-    if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
-        notes += _capacity_notes(autopilot.checks.battery_failsafes, uav.battery, envelope.volts)
+    envelope = uav.limits.envelope
+    is_battery_known = scenario.flight.battery_wh is not None or not envelope.battery_guessed
+    notes += (*_autopilot_notes(mission, autopilot, uav.battery, envelope.volts if is_battery_known else 0.0),)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
@@ -245,25 +243,6 @@ def make_setup(
         fdm_hz=fdm_hz,
         engine=engine,
     )
-
-
-def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
-    """Raise ForecastError if a route leaves the area, altitude levels or times of the wind's forecast."""
-    facts = scenario.wind.forecast
-    if facts is None:
-        return
-    positions, file = route.positions, str(scenario.spec.wind.forecast)
-    latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
-    check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
-    duration = planned_duration(route, mission)
-    if duration > (facts.last_time - facts.departure).total_seconds():
-        raise ForecastError.at(
-            file,
-            "time",
-            f"{facts.departure:%Y-%m-%d %H:%M} UTC",
-            f"the flight takes {duration / 60.0:.1f} min,"
-            f" but the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
-        )
 
 
 def planned_duration(route: Route, mission: Mission) -> float:
@@ -293,53 +272,51 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
     return autopilot.with_parameters("assumed", **values) if values else autopilot
 
 
-def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts: float) -> tuple[str, ...]:
-    """Note the battery failsafes that assume another capacity than the aircraft's battery has.
+def _autopilot_notes(mission: Mission, autopilot: Autopilot, battery: float, volts: float) -> Iterator[str]:
+    """Yield notes on what an autopilot ignores or refuses in a mission, and on its battery failsafes.
 
-    Such a failsafe acts too early or too late.  If several monitors share the load, each has its own battery, so
-    nothing is noted.
+    An airspeed beyond the autopilot's limits is noted.  ArduPlane interprets DO_CHANGE_SPEED as an airspeed only if the
+    speed type is 0, and ignores values beyond its limits.  PX4 interprets it as an airspeed for any type, and flies the
+    nearest limit.  Also noted are more items than a common flight controller stores, and battery failsafes that assume
+    another capacity than the aircraft's battery has, because they act too early or too late.  If several monitors share
+    the load, each has its own battery, so nothing is noted.
 
-    battery: energy of the battery, Wh.  volts: its voltage, V.
+    battery: energy of the battery, Wh.  volts: its voltage, V; 0 if unknown.
 
-    >>> import math
-    >>> early = BatteryFailsafe("BATT_LOW_MAH", 800.0, 1200.0, False, math.nan, "BATT_CAPACITY", 2000.0)
-    >>> _capacity_notes([early], 59.2, 14.8)[0].partition(". ")[2]
-    'The failsafe BATT_LOW_MAH 800 ends the mission with 2800 mAh left'
-    """
-    charge = _MAH_PER_AH * battery / volts
-    return tuple(
-        f"{failsafe.capacity_parameter} {failsafe.capacity:g} mAh, but the aircraft's battery has {charge:.0f} mAh"
-        f" ({battery:g} Wh at {volts:g} V). The failsafe {failsafe.parameter} {failsafe.threshold:g} ends the"
-        " mission with"
-        f" {max(0.0, charge - failsafe.used_charge):.0f} mAh left"
-        for failsafe in failsafes
-        if not failsafe.shares_charge and abs(failsafe.capacity - charge) > MAX_CAPACITY_DIFFERENCE * charge
-    )
-
-
-def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
-    """Return a note on each commanded airspeed beyond the autopilot's limits; () without limits.
-
-    ArduPlane interprets DO_CHANGE_SPEED as an airspeed only if the speed type is 0, and ignores values beyond its
-    limits.  PX4 interprets it as an airspeed for any type, and flies the nearest limit.
-
+    >>> from flight.autopilots.arduplane.autopilot import ArduPlane
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from flight.mission.items import MissionItem
     >>> faster = MissionItem(2, 178, 2, (0.0, 60.0, -1.0, 0.0), 0.0, 0.0, 0.0)
-    >>> _speed_limit_notes(Mission(None, (faster,)), SpeedLimits(9.0, 22.0, "MIN", "MAX"), "ArduPlane")
-    ('item 2: DO_CHANGE_SPEED to 60 m/s is outside MIN 9 to MAX 22 m/s; ArduPlane ignores it',)
+    >>> autopilot = ArduPlane(ArduPilotParameters.defaults())
+    >>> list(_autopilot_notes(Mission(None, (faster,)), autopilot, 888.0, 0.0))
+    ['item 2: DO_CHANGE_SPEED to 60 m/s is outside AIRSPEED_MIN 9 to AIRSPEED_MAX 22 m/s; ArduPlane ignores it']
     """
-    if limits is None:
-        return ()
-    behaviour = "flies the nearest limit instead" if limits.nearest else "ignores it"
-    range_text = f"outside {limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    return tuple(
-        f"item {item.seq}: DO_CHANGE_SPEED to {item.params[1]:g} m/s is {range_text}; {title} {behaviour}"
-        for item in mission.items
-        if item.command == Command.DO_CHANGE_SPEED
-        and (limits.nearest or item.params[0] == 0.0)
-        and item.params[1] > 0.0
-        and not limits.min <= item.params[1] <= limits.max
-    )
+    limits = autopilot.speeds.limits
+    for item in mission.items:
+        if (
+            limits is not None
+            and item.command == Command.DO_CHANGE_SPEED
+            and (limits.nearest or item.params[0] == 0.0)
+            and item.params[1] > 0.0
+            and not limits.min <= item.params[1] <= limits.max
+        ):
+            behaviour = "flies the nearest limit instead" if limits.nearest else "ignores it"
+            range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
+            yield (
+                f"item {item.seq}: DO_CHANGE_SPEED to {item.params[1]:g} m/s is outside {range_text};"
+                f" {autopilot.title} {behaviour}"
+            )
+    stored_count, board = _STORED_ITEMS.get(autopilot.checks.dialect, (len(mission.items), ""))
+    if len(mission.items) > stored_count:
+        yield f"{len(mission.items)} items: {board} stores {stored_count}, and refuses more"
+    charge = _MAH_PER_AH * battery / volts if volts else math.nan
+    for failsafe in autopilot.checks.battery_failsafes:
+        if not failsafe.shares_charge and abs(failsafe.capacity - charge) > MAX_CAPACITY_DIFFERENCE * charge:
+            yield (
+                f"{failsafe.capacity_parameter} {failsafe.capacity:g} mAh, but the aircraft's battery has"
+                f" {charge:.0f} mAh ({battery:g} Wh at {volts:g} V). The failsafe {failsafe.parameter}"
+                f" {failsafe.threshold:g} ends the mission with {max(0.0, charge - failsafe.used_charge):.0f} mAh left"
+            )
 
 
 # ----------------------------------------------------------------------

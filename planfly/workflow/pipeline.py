@@ -29,8 +29,7 @@ from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, explain_verdict
-from planfly.workflow.suggestion_trials import with_tried_suggestions
-from planfly.workflow.trial_flight import predicted_seconds
+from planfly.workflow.suggestion_trials import predicted_seconds, with_tried_suggestions
 from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
 from world.errors import FlightError, PlanflyError, StartError
@@ -117,20 +116,16 @@ class ReturnSummary:
         returns = self.returns
         return returns is not None and bool(returns.each) and not (returns.safe or returns.undecided)
 
-    def data_for_pictures(self) -> DrawnReturns | None:
+    def data_for_pictures(self, *, glides: bool = True) -> DrawnReturns | None:
         """Return the data for pictures of returns and glides, or None without judged returns.
 
-        The computation of the glides takes a few seconds.
+        glides: False to leave out the glides, whose computation takes a few seconds.
         """
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
+        if not glides:
+            return drawn_returns_without_glides(self.world, self.starts, self.returns)
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
-
-    def drawn_returns_without_glides(self) -> DrawnReturns | None:
-        """Return the data for pictures of returns without glides, or None without judged returns."""
-        if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
-            return None
-        return drawn_returns_without_glides(self.world, self.starts, self.returns)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -367,7 +362,7 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
             for event in events:
                 recorder.event(event.time, event.text, event.level)
             summary = return_summary(flight.setup, track) if task.returns else None
-            drawn_returns = None if summary is None else summary.drawn_returns_without_glides()
+            drawn_returns = None if summary is None else summary.data_for_pictures(glides=False)
             recorder.finish(end_reason, verdict, reference_flights, drawn_returns)
     return FlownMission(
         requirements.setup,

@@ -25,14 +25,17 @@ from logs.verdict.summary import most_urgent_failure
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
-from planfly.workflow.suggestion_trials import MAX_TRIED_LEGS, PassedTrial, SuggestionTrials, tried_suggestions
-from planfly.workflow.trial_flight import (
+from planfly.workflow.suggestion_trials import (
     ALTITUDE_ERROR_M,
+    MAX_TRIED_LEGS,
     AbortCheck,
+    PassedTrial,
+    SuggestionTrials,
     Trial,
     TrialAborted,
     max_explaining_flights,
     never_abort,
+    tried_suggestions,
 )
 
 # ----------------------------------------------------------------------
@@ -291,7 +294,7 @@ def explain_verdict(
 
     requirements: the route requirements of the flown setup.
     is_requested: True to fly the reference flight regardless of its length.  Otherwise there is none for a flight that
-        is too long for `planfly.workflow.trial_flight.max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs.
+        is too long for `max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs.
         A flight by planfly's own guidance never has a reference flight, but its suggestions are tried.
     should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict
     contains the results up to that moment.

@@ -58,7 +58,7 @@ from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
 from world.kernels import Record
-from world.scenario_tables import ArduPlaneVersion, FlightTable
+from world.scenario_tables import NEWEST_ARDUPLANE, ArduPlaneVersion, FlightTable
 
 # Fields of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` that belong to the current leg or mission, not to the
 # aircraft.
@@ -122,7 +122,9 @@ class ArduPlane(Autopilot):
         The simulated release is the first known of: the release that the table states, the release that wrote the file,
         the newest release.
         """
-        version, notes = choose_release(table.arduplane_version, table.params)
+        version, notes = table.arduplane_version or NEWEST_ARDUPLANE, tuple[str, ...]()
+        if table.params is not None:
+            version, notes = choose_release(table.arduplane_version, table.params)
         return cls(ArduPilotParameters.load(aircraft, table.params, version, notes))
 
     @classmethod

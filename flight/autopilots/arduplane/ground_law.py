@@ -56,7 +56,7 @@ from flight.simulation.tick import (
     advance_model,
     airborne_end_code,
     begin_tick,
-    fill_tick,
+    end_tick,
     read_state,
 )
 from world.arrays import Floats, Heights
@@ -208,7 +208,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
     else:
         find_on_path(work.estimated, pieces, work.memory)
         _tick_landing(work, arduplane, waypoints[memory.leg + 1])
-    fill_tick(work, block)
+    end_tick(work, block)
     return end_status(work, ground)
 
 

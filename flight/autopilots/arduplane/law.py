@@ -20,6 +20,7 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     advance_model,
+    airborne_end_code,
     begin_tick,
     end_tick,
     read_state,
@@ -371,7 +372,8 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:
         work.commands,
         work.timing.dt,
     )
-    return end_tick(work, block)
+    end_tick(work, block)
+    return airborne_end_code(work)
 
 
 @compiled

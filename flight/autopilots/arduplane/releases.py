@@ -82,15 +82,13 @@ class ReleaseChoice(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def choose_release(requested_version: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
-    """Return the release to simulate: the requested one, the release of the parameter file, or the newest.
+def choose_release(requested_version: ArduPlaneVersion | None, params: str) -> ReleaseChoice:
+    """Return the release to simulate with a parameter file: the requested one, the file's release, or the newest.
 
     The result has a note if parameters of the file have another name in this release.
 
     params: path of the parameter file.  Raises ParameterError if it cannot be read.
     """
-    if params is None:
-        return ReleaseChoice(requested_version or NEWEST_ARDUPLANE)
     file = Path(params)
     text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
     names = list(parse_parameters(text, params))

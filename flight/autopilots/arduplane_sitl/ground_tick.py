@@ -23,7 +23,7 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
-    fill_tick,
+    end_tick,
 )
 from world.arrays import Floats, Heights
 from world.kernels import Record, compiled, inner
@@ -59,7 +59,7 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
     memory.speed_command = path.waypoint[memory.leg].airspeed
     memory.is_finished = False
     update_phase(work.true, ground, settings.on_last_leg)
-    fill_tick(work, block)
+    end_tick(work, block)
     return end_status(work, ground)
 
 

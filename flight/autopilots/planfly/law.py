@@ -30,6 +30,7 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     advance_model,
+    airborne_end_code,
     begin_tick,
     end_tick,
     read_state,
@@ -117,7 +118,8 @@ def planfly_tick(block: Floats, heights: Heights) -> int:
         work.commands,
         work.timing.dt,
     )
-    return end_tick(work, block)
+    end_tick(work, block)
+    return airborne_end_code(work)
 
 
 @compiled

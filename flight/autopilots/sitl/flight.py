@@ -40,6 +40,7 @@ from flight.simulation.tick import (
     RTL_ARRIVAL_RADIUS_M,
     WORKSPACE,
     WORKSPACE_NUMBERS,
+    airborne_end_code,
     begin_tick,
     end_tick,
     update_end_loiter,
@@ -91,7 +92,8 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
         memory.is_in_rtl = previous_waypoint.loiter_radius != 0.0 and previous_waypoint.stop == last_waypoint.stop
         if memory.is_finished:
             memory.cross_track = cross_track
-    return end_tick(work, block)
+    end_tick(work, block)
+    return airborne_end_code(work)
 
 
 @inner
@@ -250,7 +252,6 @@ class SitlFlight(ProgramFlight):
             release_start = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
             self._start_trimmed(setup.mission.source, release_start)
             self._rail = rail_end(self.fdm.read(), start.wind)
-        self._start_disturbances(setup)
         self._mission = make_uploaded_mission(setup)
         if self._law is not None:
             self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)

@@ -501,14 +501,12 @@ def test_a_flight_that_still_circles_when_its_time_is_over_says_so() -> None:
     setup = setup_of(wp(0, -1500), wp(0, 0, 100, 18, p="3 0 150 0"), wp(1500, 1500))
     for leg, place in ((0, " in the loiter of item 2"), (setup.route.legs - 1, "")):
         flight = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
-        flight._start_disturbances(setup)
         flight.max_ticks, flight.guidance_memory.leg = 0, leg
         assert flight.fly_block(10)[1] == f"time limit of 0 s reached{place}"
 
 
 def test_a_block_ends_with_the_time() -> None:
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])
-    flight._start_disturbances(MAKE(np.array([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])))
     flight.max_ticks = 0
     rows, ended = flight.fly_block(10)
     assert len(rows) == 0

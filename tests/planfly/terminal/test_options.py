@@ -15,7 +15,7 @@ from planfly.terminal.options import (
     add_flight_options,
     add_result_options,
     add_steering_options,
-    call_api,
+    given_options,
     watch_stop_signals,
 )
 
@@ -147,6 +147,8 @@ def test_a_call_states_the_keywords_that_the_options_name() -> None:
         return mission, seed, out, fence
 
     args = argparse.Namespace(mission="a.plan", seed=3, out=None, fence=[], json="-", overwrite=True)
-    assert call_api(api, args) == ("a.plan", 3, "here", [])
-    assert call_api(api, args, seed=4, out="there") == ("a.plan", 4, "there", [])
-    assert call_api(api, args, seed=None) == ("a.plan", 1, "here", [])
+    assert api(**given_options(args, api)) == ("a.plan", 3, "here", [])
+    assert api(**given_options(args, api, seed=4, out="there")) == ("a.plan", 4, "there", [])
+    assert api(**given_options(args, api, seed=None)) == ("a.plan", 1, "here", [])
+    del args.overwrite
+    assert api(**given_options(args)) == ("a.plan", 3, "here", [])

@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from planfly.flight_options import MissionOptions, read_named_fences
 from planfly.live.served_flights import ServeOptions, load_served_scenario
 from planfly.plan_fence import add_plan_fence
 from planfly.workflow.make_plan import make_plan
-from planfly.workflow.open_flight import _capacity_notes, _item_count_notes, mission_of_plan, open_flight
+from planfly.workflow.open_flight import _autopilot_notes, mission_of_plan, open_flight
 from planfly.workflow.uav import load_uav, uav_of_setup
 from planner.plan import plan_json
 from tests.mission_lines import a_plan, setup_of, wp
@@ -356,6 +357,15 @@ def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> No
         open_flight(short_mission.parent / "nowhere" / "m.waypoints", {})
 
 
+def autopilot_notes(
+    items: tuple[MissionItem, ...], dialect: Any, failsafes: tuple[BatteryFailsafe, ...] = ()
+) -> tuple[str, ...]:
+    """With a battery of 29.6 Wh at 14.8 V, and no limits of the airspeed."""
+    checks, speeds = SimpleNamespace(dialect=dialect, battery_failsafes=failsafes), SimpleNamespace(limits=None)
+    autopilot: Any = SimpleNamespace(checks=checks, speeds=speeds, title="")
+    return tuple(_autopilot_notes(Mission(None, items), autopilot, 29.6, 14.8))
+
+
 @pytest.mark.parametrize(
     ("dialect", "count", "limit"),
     # `StorageManager` of ArduPilot on a Pixhawk; `NUM_MISSIONS_SUPPORTED` of PX4; planfly's own guidance has no board.
@@ -363,7 +373,7 @@ def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> No
 )
 def test_a_mission_that_a_common_board_does_not_store_is_noted(dialect: Any, count: int, limit: int | None) -> None:
     items = tuple(MissionItem(k, 16, 3, (0.0, 0.0, 0.0, 0.0), 46.0, 8.0, 100.0) for k in range(count))
-    notes = _item_count_notes(Mission(None, items), dialect)
+    notes = autopilot_notes(items, dialect=dialect)
     assert len(notes) == (limit is not None)
     assert all(note.startswith(f"{count} items: ") and f" stores {limit}," in note for note in notes)
 
@@ -378,7 +388,7 @@ def test_a_capacity_unlike_the_batterys_is_noted_with_what_the_failsafe_leaves(
 ) -> None:
     failsafe = BatteryFailsafe("BATT_LOW_MAH", 800.0, capacity - 800.0)
     failsafe = failsafe._replace(capacity_parameter="BATT_CAPACITY", capacity=capacity)
-    notes = _capacity_notes([failsafe, BatteryFailsafe("BATT_LOW_VOLT", 14.0)], 29.6, 14.8)
+    notes = autopilot_notes((), dialect="ardupilot", failsafes=(failsafe, BatteryFailsafe("BATT_LOW_VOLT", 14.0)))
     expected = (
         f"BATT_CAPACITY {capacity:g} mAh, but the aircraft's battery has 2000 mAh (29.6 Wh at 14.8 V)."
         f" The failsafe BATT_LOW_MAH 800 ends the mission with {left} mAh left"

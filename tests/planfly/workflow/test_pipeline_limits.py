@@ -16,7 +16,7 @@ from planfly.cli import main
 from planfly.runtime.stages import Advance, Receiver, send_progress_to
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge, flying_stage
-from planfly.workflow.trial_flight import predicted_seconds
+from planfly.workflow.suggestion_trials import predicted_seconds
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.test_interruptions import LONG
 from tests.synthetic import make_setup

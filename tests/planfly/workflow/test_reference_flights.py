@@ -35,8 +35,7 @@ from planfly.workflow.reference_flights import (
     judge_airframe_flight,
     passes_with_margin,
 )
-from planfly.workflow.suggestion_trials import PassedTrial, SuggestionTrials
-from planfly.workflow.trial_flight import Trial
+from planfly.workflow.suggestion_trials import PassedTrial, SuggestionTrials, Trial
 from tests.setups import setup_maker
 
 LEG = Place("leg", 4)

@@ -14,8 +14,7 @@ from logs.verdict.document import VerdictDocument
 from planfly.api import predicting
 from planfly.cli import main
 from planfly.planning.paper import SeededPlan
-from planfly.terminal.answers import FlyAnswer
-from planfly.terminal.verdict_answers import CheckAnswer
+from planfly.terminal.verdict_answers import CheckAnswer, FlyAnswer
 from tests.logs.importers.written_logs import dataflash
 from tests.planfly.commands.imported_log_files import example_plan
 from tests.planfly.conftest import FIELD

@@ -9,8 +9,8 @@ import pytest
 from aircraft.catalog import load_aircraft
 from logs.recording.example_log import example_log
 from logs.verdict.measures import route_requirements
-from planfly.workflow import trial_flight
-from planfly.workflow.trial_flight import Trial, TrialAborted, max_explaining_flights
+from planfly.workflow import suggestion_trials
+from planfly.workflow.suggestion_trials import Trial, TrialAborted, max_explaining_flights
 from tests.synthetic import make_setup
 from world.errors import StartError
 
@@ -25,7 +25,7 @@ def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.Monk
         flown.append(setup)
         raise StartError("f", "no trim")
 
-    monkeypatch.setattr(trial_flight, "Flight", fly)
+    monkeypatch.setattr(suggestion_trials, "Flight", fly)
     trial = Trial(SETUP, AIRCRAFT)
     assert trial.geometry_verdict.level == "geometric"
     assert flown == []
@@ -52,7 +52,7 @@ def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
     def fly(setup: object, aircraft: object) -> None:
         raise StartError("f", "no trim")
 
-    monkeypatch.setattr(trial_flight, "Flight", fly)
+    monkeypatch.setattr(suggestion_trials, "Flight", fly)
     assert Trial(setup, AIRCRAFT).flight[1] == end_reason
 
 
