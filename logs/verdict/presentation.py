@@ -40,7 +40,7 @@ _SHOWN_WORDS = tuple(
 
 
 def finding_words(finding: Finding) -> RuleWords:
-    """Return the texts with which a finding is shown: those of its rule, or of the overlap of photos."""
+    """Return the texts of a finding's rule, or the texts on photo overlap for an overlap of a survey."""
     is_overlap = finding.rule == _OVERLAP_WORDS.name and finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
     return _OVERLAP_WORDS if is_overlap else RULE_WORDS[finding.rule]
 
@@ -135,8 +135,11 @@ def number_texts(finding: Finding) -> NumberTexts:
     )
 
 
-def missed_text(finding: Finding) -> str:
-    """State by how much a failed finding misses its limit, with the unit; "" if the finding has no limit."""
+def limit_violation_text(finding: Finding) -> str:
+    """Return how far a failed finding is beyond its limit and tolerance, with the unit.
+
+    Return "" for a finding that did not fail, or that has no limit or no margin.
+    """
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
         return ""
     distance = -finding.margin - (finding.tolerance or 0.0)
@@ -145,7 +148,7 @@ def missed_text(finding: Finding) -> str:
 
 
 def method_text(finding: Finding) -> str:
-    """Return the method of a finding, with its limit and its tolerance."""
+    """Return the method of a finding, with its limit and its tolerance if it has both."""
     if not finding.tolerance or not finding.method or finding.limit is None:
         return finding.method
     limit, tolerance = (format_quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
@@ -158,7 +161,7 @@ def state_text(state: State) -> str:
 
 
 def count_sentence(findings: Sequence[Finding]) -> str:
-    """Return a sentence on the numbers of findings that pass, fail, and were not judged."""
+    """Return a sentence that states how many findings pass, how many fail, and how many were not judged."""
     counts = Counter(finding.state for finding in findings)
     passed_text = f"{counts['ok']} of {counts['ok'] + counts['fail']} judged findings pass"
     failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
@@ -196,7 +199,7 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """Failed finding furthest beyond its limit, else the finding closest to its limit; None if none."""
+        """Failed finding furthest beyond its limit, or else the passed finding closest to its limit, or None."""
         return closest_to_limit(self.findings)
 
     @property
@@ -228,7 +231,10 @@ class RuleFindings:
 
     @property
     def failure_heading(self) -> str:
-        """Rule and place of its worst failed finding, with the number of failed findings if there are several."""
+        """Rule and place of its worst failed finding, with the number of failed findings if there are several.
+
+        Raises IndexError for a rule without failed findings.
+        """
         worst_finding = self.failed[0]
         if len(self.failed) == 1:
             return finding_heading(worst_finding)
@@ -245,7 +251,9 @@ class RuleFindings:
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
-    """Group findings by rule in the order of `RULE_WORDS`; a rule without findings is left out.
+    """Group findings by rule in the order of `RULE_WORDS`, with photo overlap as a group of its own.
+
+    A rule without findings is left out.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place

@@ -1,6 +1,6 @@
 """Describe the ground risk of a mission in lines, and in a table for an application."""
 
-from logs.verdict.conditions import flown_lines
+from logs.verdict.conditions import flown_condition_lines
 from logs.verdict.returns.judge_returns import make_return_world, returning_title, without_engine_world
 from logs.verdict.returns.returns_text import return_law_lines
 from planfly.campaigns.find_ground_risk import GroundRiskResult
@@ -129,7 +129,9 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
 def table_text(result: GroundRiskResult) -> str:
     """Return the table for an application, as Markdown."""
     table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in table_rows(result))
-    conditions = "\n".join(f"- {line}" for line in (*flown_lines(result.base.conditions()), *_flight_lines(result)))
+    conditions = "\n".join(
+        f"- {line}" for line in (*flown_condition_lines(result.base.conditions()), *_flight_lines(result))
+    )
     return (
         f"# Ground risk of {result.base.name}\n\n{answer_line(result)}\n\n"
         f"| quantity | value | source |\n|---|---|---|\n{table}\n\n"

@@ -74,14 +74,14 @@ def link(args: argparse.Namespace) -> int:
 
     The exit code is 0 if the link is kept, 4 if it is lost for too long, and 3 if this is not known.
     """
-    from logs.verdict.conditions import flown_lines, judging_conditions
+    from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import linking
 
     result = call_api(linking.link, args)
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
-    for text in (*flown_lines(judging_conditions(result.setup)), *result.outage_lines, *result.return_lines):
+    for text in (*flown_condition_lines(judging_conditions(result.setup)), *result.outage_lines, *result.return_lines):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")

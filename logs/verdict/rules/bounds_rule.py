@@ -24,7 +24,7 @@ def bounds_findings(
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
     planned_margin, edge, row = _min_distance_inside(requirements, requirements.points)
-    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint(row))}"
+    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint_place(row))}"
     ok: bool | None = planned_margin >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:

@@ -135,7 +135,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     k = int(np.argmax(depths))
     if not float(depths[k]) > BELOW_HOME_M:
         return []
-    lowest_waypoint = requirements.waypoint(k)
+    lowest_waypoint = requirements.waypoint_place(k)
     brief = f"waypoint {lowest_waypoint.number} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
     fault = message(
         brief, "; no terrain data confirms that the ground there is so low. Name an elevation file with --terrain"
@@ -300,7 +300,7 @@ def _planned_finding(
     known_height = math.nan if is_unknown else planned_height
     return make_finding(
         "clearance",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=None if is_unknown else not is_short,
         reason=reason,
         faults=[_placed_message(requirements, leg, off_text)] if is_unknown else [],
@@ -368,7 +368,7 @@ def _flown_finding(
         reason += f"; the planned path descends to {_height_text(planned_height)}"
     return make_finding(
         "clearance",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=reason,
         faults=[_placed_message(requirements, leg, off_text)] if is_unknown else [],
@@ -399,7 +399,7 @@ def _height_text(clearance: float) -> str:
 
 def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Message:
     """Return a message that begins with the name of a leg."""
-    return message(f"{place_text(requirements.leg(leg))} {text}", placed=True)
+    return message(f"{place_text(requirements.leg_place(leg))} {text}", placed=True)
 
 
 def _time_and_place_text(aligned: AlignedTrack, segment: int, fraction: float) -> str:

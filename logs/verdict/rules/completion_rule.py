@@ -29,7 +29,9 @@ def completion_findings(
         ending_place = ""
         if aligned is not None and not aligned.passed[-1]:
             row = len(aligned.track) - 1
-            ending_place = f" on {place_text(requirements.leg(aligned.leg_at(row)))}, {aligned.position_text(row)}"
+            ending_place = (
+                f" on {place_text(requirements.leg_place(aligned.leg_at(row)))}, {aligned.position_text(row)}"
+            )
         faults.append(message(f"the flight ended early: {end_reason}", ending_place))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
@@ -41,7 +43,7 @@ def completion_findings(
         # A leg counts as flown only once its loiter is complete.
         flown_count = leg_count - len(set(leg_numbers[~aligned.passed[1:]].tolist()))
         if flown_count < leg_count:
-            first_unflown = place_text(requirements.leg(int(np.argmin(aligned.passed[1:]))))
+            first_unflown = place_text(requirements.leg_place(int(np.argmin(aligned.passed[1:]))))
             unflown_text = f"; the first leg that was not flown to its end is {first_unflown}"
             faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown", unflown_text))
         # A long gap between the log's rows, and positions that contradict the velocities, are faults, too.

@@ -18,7 +18,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import suggest_passing_zone
+from logs.verdict.suggestions import suggest_shift_past_zone
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import ZoneRecords, zone_records
@@ -228,7 +228,7 @@ def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> s
     event: "entry" or "exit" of the violation, or "at" for its deepest point or, without a violation, for the point
         that is closest to one.
     """
-    leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
+    leg = place_text(requirements.leg_place(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s on {leg}, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL"
 
@@ -237,6 +237,6 @@ RULE = Rule(
     name="fence",
     tolerances=("ROUNDING_M",),
     judge=fence_findings,
-    suggest=suggest_passing_zone,
+    suggest=suggest_shift_past_zone,
     log=LogNeeds(("heights",)),
 )

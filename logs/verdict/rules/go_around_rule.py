@@ -26,8 +26,8 @@ from flight.mission.return_path import LandingStart
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
-    first_hazard_on_path,
     has_ground_paths,
+    hazard_on_path,
     landing_item,
     takeoff_item,
 )
@@ -250,7 +250,7 @@ def _go_around_finding(
     requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
 ) -> Finding:
     """Simulate go-arounds from positions on the glide, and judge the worst; it fails only if required."""
-    setup, place, height = requirements.setup, requirements.waypoint(landing.waypoint), landing.climb_height
+    setup, place, height = requirements.setup, requirements.waypoint_place(landing.waypoint), landing.climb_height
     climb_text = (
         f"the aircraft climbs to {height:.0f} m above home,"
         f" {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
@@ -423,7 +423,7 @@ def _judge_go_around(
     path = GroundPath(positions, np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]))
     heights = path_clearance(terrain.heights, terrain.to_pixel.record, positions)[0]
     min_height = float(np.nanmin(heights, initial=math.inf))
-    go_around = go_around._replace(entered_hazard=first_hazard_on_path(requirements, path))
+    go_around = go_around._replace(entered_hazard=hazard_on_path(requirements, path))
     if end_status == RETURN_GROUND_IMPACT or min_height <= 0.0:
         return go_around._replace(lowest_height=min(min_height, 0.0), impact_time=float(result["clearance_time"]))
     landing_direction = math.sin(landing.course), math.cos(landing.course)

@@ -162,7 +162,7 @@ def _leg_finding(
         facts.append(f"the planned path rises to {planned_maximum.height:.1f} m above ground")
     return make_finding(
         "height",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=finding_reason(faults, facts),
         faults=faults,

@@ -13,7 +13,7 @@ import numpy as np
 from flight.mission.ground_phases import TakeOff
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, finding_reason, make_finding, message
-from logs.verdict.measures.ground_paths import GroundPath, first_hazard_on_path, min_path_clearance, track_path
+from logs.verdict.measures.ground_paths import GroundPath, hazard_on_path, min_path_clearance, track_path
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import Rule
@@ -75,7 +75,7 @@ def launch_findings(
         place_text = f" {distance:.0f} m from home on the flown course; {LAUNCH_CLEARANCE_M:g} m are required"
         side = "above" if clearance >= 0.0 else "below"
         faults.append(message(f"{abs(clearance):.1f} m {side} ground", place_text))
-    entered_hazard = first_hazard_on_path(requirements, path)
+    entered_hazard = hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
     notes = _describe_take_off(take_off, track, distances, clearance, terrain)
@@ -92,7 +92,7 @@ def launch_findings(
     return [
         make_finding(
             "launch",
-            requirements.waypoint(take_off.waypoint),
+            requirements.waypoint_place(take_off.waypoint),
             ok=False if faults else None if undecided_messages else True,
             reason=finding_reason(faults or undecided_messages, notes),
             faults=faults or undecided_messages,

@@ -260,11 +260,11 @@ def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, li
     if aligned is None:
         path = requirements.path
         segment = int(np.searchsorted(path.times, time, side="right")) - 1
-        return requirements.leg(int(path.legs[min(max(segment, 0), len(path.legs) - 1)]))
+        return requirements.leg_place(int(path.legs[min(max(segment, 0), len(path.legs) - 1)]))
     approach = None if phases is None else phases.procedures.approach
     if phases is not None and approach is not None and time > phases.track.time[phases.landing_start_row]:
-        return phases.whole_route.leg(approach.leg)
-    return requirements.leg(aligned.leg_at(int(np.searchsorted(aligned.track.time, time))))
+        return phases.whole_route.leg_place(approach.leg)
+    return requirements.leg_place(aligned.leg_at(int(np.searchsorted(aligned.track.time, time))))
 
 
 def _link_finding(

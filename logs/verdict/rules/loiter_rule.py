@@ -110,7 +110,7 @@ def merge_loiter_findings(
         includes_end = joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
         last = circle.last + 1 if includes_end else circle.last
         corner_findings = remaining_findings(
-            ("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)]
+            ("turn", "waypoint"), [requirements.waypoint_place(i) for i in range(circle.first, last + 1)]
         )
         for k, _ in corner_findings:
             merged[k] = None
@@ -118,7 +118,7 @@ def merge_loiter_findings(
             merged[corner_findings[0][0]] = _loiter_finding(
                 requirements, aligned, circle, [finding for _, finding in corner_findings]
             )
-        legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
+        legs = [requirements.leg_place(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
             rule_findings = remaining_findings((rule,), legs)
             if joins_at_center and any(finding.ok is not None for _, finding in rule_findings):
@@ -147,7 +147,7 @@ def end_loiter_findings(
     if reach_and_hazards is None:
         return []
     reach, hazards = reach_and_hazards
-    title, place = requirements.setup.autopilot.title, requirements.waypoint(requirements.legs)
+    title, place = requirements.setup.autopilot.title, requirements.waypoint_place(requirements.legs)
     if not math.isfinite(reach):
         fault = message(
             f"{title} then circles here indefinitely, and the wind is too strong to fly a circle",
@@ -230,7 +230,7 @@ def _loiter_finding(
         facts += [judgement.hazards_text] if judgement.hazards_text else []
     return make_finding(
         "loiter",
-        requirements.waypoint(circle.first),
+        requirements.waypoint_place(circle.first),
         ok=ok,
         reason=finding_reason(faults, facts),
         faults=faults,
@@ -344,7 +344,9 @@ def _corner_faults(
         ]
     finding = failed_corners[0]
     reason_text = f"{place_text(finding.place)}: {finding.reason}"
-    return [Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))]
+    return [
+        Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint_place(circle.first))
+    ]
 
 
 def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:

@@ -65,7 +65,7 @@ def departure_findings(
         time = track.time[k] + aligned.clearance_fraction[k] * (track.time[k + 1] - track.time[k])
         faults.append(
             message(
-                f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
+                f"ground contact at {time:.1f} s on {place_text(requirements.leg_place(aligned.leg_at(k)))}",
                 f", {aligned.position_text(k, float(aligned.clearance_fraction[k]))}",
             )
         )

@@ -146,7 +146,7 @@ def run_rules(
     merged = merged if geometric else (*blocking_item_findings(requirements.setup), *merged)
     if not suggests:
         return merged
-    return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
+    return_legs = {requirements.leg_place(i) for i in requirements.setup.route.rtl_legs}
     places = [k for k, finding in enumerate(merged) if _needs_suggestions(finding, return_legs)]
     results = list(merged)
     for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():
@@ -182,7 +182,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
         for side_requirements in (replace(requirements, ground_phases=None), other_side)
     ]
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
-    corners_text = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
+    corners_text = ", ".join(place_text(requirements.waypoint_place(int(i))) for i in corners)
     one_sided_findings = []
     for key in (failures_by_side[0].keys() ^ failures_by_side[1].keys()) - failed_keys:
         finding = failures_by_side[0].get(key) or failures_by_side[1][key]

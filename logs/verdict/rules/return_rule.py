@@ -112,7 +112,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     setup = requirements.setup
     if not judges_return_after_last_item(setup):
         return []
-    end_waypoint = requirements.waypoint(requirements.legs)
+    end_waypoint = requirements.waypoint_place(requirements.legs)
     if reason := missing_home_text(setup):
         return [make_finding("return", end_waypoint, ok=None, reason=reason, check=NO_HOME)]
     ok: bool | None = None
@@ -273,7 +273,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     return [
         make_finding(
             "return",
-            requirements.waypoint(route.rtl_start + 1),
+            requirements.waypoint_place(route.rtl_start + 1),
             ok=ok,
             reason=reason,
             faults=faults,
@@ -297,10 +297,12 @@ def without_path_following_findings(
         return tuple(findings)
     # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
     end_waypoint = requirements.setup.route.rtl_end
-    return_points = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
+    return_points = {
+        requirements.waypoint_place(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))
+    }
     legs = requirements.setup.route.rtl_legs
-    return_points |= {requirements.leg(i) for i in legs}
-    first_corner = requirements.waypoint(first_leg)
+    return_points |= {requirements.leg_place(i) for i in legs}
+    first_corner = requirements.waypoint_place(first_leg)
     kept_findings = [
         finding
         for finding in findings
@@ -314,7 +316,7 @@ def without_path_following_findings(
     ):
         return tuple(kept_findings)
     # Each part of the flown return belongs to a drawn leg.  A drawn leg without such a part was not flown.
-    unflown_places = {requirements.leg(i) for i in legs if not aligned.has_flown(i)}
+    unflown_places = {requirements.leg_place(i) for i in legs if not aligned.has_flown(i)}
     return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown_places)
 
 
@@ -322,7 +324,7 @@ def _suggest_end_loiter(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest an unlimited loiter at the last waypoint, if the automatic return from there fails."""
-    setup, end = requirements.setup, requirements.waypoint(requirements.legs)
+    setup, end = requirements.setup, requirements.waypoint_place(requirements.legs)
     commands = {item.seq: item.command for item in setup.mission.items}
     is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT
     if finding.place != end or not is_waypoint or not judges_return_after_last_item(setup):

@@ -20,7 +20,7 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.acceptance import slope_with_next_leg, step_height
+from logs.verdict.measures.acceptance import negligible_step_height, slope_with_next_leg
 from logs.verdict.measures.ground_following import follows_ground, mean_ground_slope, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
 from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
@@ -81,7 +81,7 @@ def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: floa
     check = UNKNOWN_AIRCRAFT if is_uncertain and float(certain_limits[leg + 1]) < limit < math.inf else ""
     climb = float(requirements.points[leg + 1, 2] - requirements.points[leg, 2])
     reason = (
-        f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {abs(climb):.0f} m"
+        f"{place_text(requirements.waypoint_place(leg + 1))} is passed at once; the {abs(climb):.0f} m"
         f" {'up' if climb > 0.0 else 'down'} to it are flown on the next leg, which then needs"
         f" {math.degrees(slope):+.2f}°"
     )
@@ -90,7 +90,7 @@ def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: floa
         reason += ", and the aircraft flies below that leg as drawn, which only a flight can judge"
     return make_finding(
         "slope",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=None if check else True,
         reason=reason,
         planned=math.degrees(slope),
@@ -159,7 +159,7 @@ def _leg_finding(
     deciding_fit = None if is_plan_steep else slope_fit
     return make_finding(
         "slope",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -211,7 +211,7 @@ def _flown_messages(
         measured.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
     arc = steep_arc(requirements, leg)
     if arc is not None and _is_arc_within_tolerance(arc, measure):
-        place = place_text(requirements.waypoint(leg + 1))
+        place = place_text(requirements.waypoint_place(leg + 1))
         named_facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     facts = [text for name, text in named_facts if name not in flown_faults]
     if requirements.envelope:
@@ -235,7 +235,7 @@ def _planned_slope_messages(
     facts: list[str] = []
     slope = float(requirements.slopes[leg])
     if abs(slope) > limit + PLAN_TOLERANCE_RAD:
-        step = step_height(requirements, leg)
+        step = negligible_step_height(requirements, leg)
         ground_slope = mean_ground_slope(requirements, leg) if slope < 0.0 and source != "scenario" else math.nan
         if ground_slope < -limit:
             facts.append(
@@ -249,7 +249,7 @@ def _planned_slope_messages(
             if requirements.runs[leg] < MIN_LEG_LENGTH_M:
                 height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
                 slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(slope)):.1f}°"
-            number, verb = requirements.leg(leg).number, "climbs" if slope >= 0.0 else "descends"
+            number, verb = requirements.leg_place(leg).number, "climbs" if slope >= 0.0 else "descends"
             if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
                 airspeed = float(requirements.route.leg_airspeeds[leg])
                 explanation = f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s"
@@ -301,7 +301,7 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
         else _limit_text(requirements, leg, limit, source)
     )
     brief = (
-        f"leg {requirements.leg(leg).number} follows ground that rises at {math.degrees(ground.slope):.1f}°"
+        f"leg {requirements.leg_place(leg).number} follows ground that rises at {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
     explanation = f"; {limit_text}, so the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
@@ -390,12 +390,12 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     if arc is None or (measure is not None and _is_arc_within_tolerance(arc, measure)):
         return []
     corner = leg + 1
-    place = requirements.waypoint(corner)
+    place = requirements.waypoint_place(corner)
     length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
     slope = math.degrees(math.atan(abs(arc.tangent)))
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
-    first, second = requirements.leg(leg).number, requirements.leg(corner).number
+    first, second = requirements.leg_place(leg).number, requirements.leg_place(corner).number
     arc_text = f"the arc at {place_text(place)} {verb} at {slope:.1f}° for {length:.0f} m"
     side = "below" if arc.tangent > 0.0 else "above"
     limit = (

@@ -118,7 +118,7 @@ def _speed_finding(
     ok = None if check else not faults
     return make_finding(
         "speed",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=None if ok and is_unflown else ok,
         reason=finding_reason(faults, notes),
         faults=faults,
@@ -279,7 +279,7 @@ def _level_speed_range(
     max_speed = float(np.min([upper for _, upper in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
-        number = requirements.leg(leg).number
+        number = requirements.leg_place(leg).number
         faults.append(message(f"the wind is too strong to hold the course of leg {number} at {commanded:.0f} m/s"))
     max_altitude = max(altitudes)
     if math.isnan(min_speed) or math.isnan(max_speed):

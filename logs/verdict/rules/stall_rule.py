@@ -71,7 +71,9 @@ def stall_findings(
     planned = []
     if worst_margin is not None:
         _, corner, margin = worst_margin
-        planned = [_stall_finding(margin, f"at waypoint {requirements.waypoint(corner).number}", 0.0, geometric=True)]
+        planned = [
+            _stall_finding(margin, f"at waypoint {requirements.waypoint_place(corner).number}", 0.0, geometric=True)
+        ]
     if geometric:
         return planned
     # Without an envelope there is no limit to compare a flight with.

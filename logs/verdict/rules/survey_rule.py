@@ -186,7 +186,7 @@ def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Surv
                 f"flown as drawn; within {reach:.0f} m of it {'; '.join(hazards)}; only a simulated "
                 "flight shows whether the turn is safe"
             )
-            place, method = requirements.leg(first), "its surroundings"
+            place, method = requirements.leg_place(first), "its surroundings"
             findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_PATH, method=method))
     return findings
 
@@ -234,7 +234,7 @@ def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine,
 
 def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
     """Return the first leg of a photo line as the place of its findings."""
-    return requirements.leg(line.first)
+    return requirements.leg_place(line.first)
 
 
 def _planned_finding(
@@ -352,8 +352,8 @@ def _flown_finding(
             f": {unusable_parts_text(measure)}{ends_text}",
         )
         faults, facts = [fault], []
-    if measure.missed_photos:
-        facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
+    if measure.missed_photo_count:
+        facts.append(f"{measure.missed_photo_count} of {count_text(measure.planned_photo_count, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
 
 
@@ -411,7 +411,7 @@ def _line_finding(
             Fact("height error", measure.max_height_error, "m"),
             Fact("lost at its start", measure.lost_at_start, "m"),
             Fact("lost at its end", measure.lost_at_end, "m"),
-            Fact("photos missed", float(measure.missed_photos), ""),
+            Fact("photos missed", float(measure.missed_photo_count), ""),
         ]
     return make_finding(
         "survey",

@@ -55,7 +55,7 @@ def takeoff_findings(
         return [
             make_finding(
                 "takeoff",
-                requirements.waypoint(0),
+                requirements.waypoint_place(0),
                 ok=False,
                 reason=fault.text,
                 faults=[fault],
@@ -74,12 +74,12 @@ def takeoff_findings(
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_position:
         reason = f"the autopilot chooses the course of the climb to {altitude:.0f} m AMSL over home"
-        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
+        return [_unjudged_finding("takeoff", requirements.waypoint_place(waypoint), reason)]
     imported_log = requirements.setup.imported_log
     if imported_log is not None and not imported_log.aircraft_known:
         return [
             _unjudged_finding(
-                "takeoff", requirements.waypoint(waypoint), "no aircraft was named; name it with --aircraft"
+                "takeoff", requirements.waypoint_place(waypoint), "no aircraft was named; name it with --aircraft"
             )
         ]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
@@ -105,7 +105,7 @@ def landing_findings(
         route = requirements.setup.route
         if route.rtl_start is not None:
             reason = RTL_NOT_CONTINUED_TEXT
-        end_waypoint = requirements.waypoint(requirements.legs)
+        end_waypoint = requirements.waypoint_place(requirements.legs)
         is_return_continued = RTL_NOT_CONTINUED_TEXT in " ".join(route.notes)
         if route.rtl_start is not None and not is_return_continued:
             # The return ends the mission; the landing after it is not flown.
@@ -144,7 +144,7 @@ def _slope_finding(
     first, last: waypoints.  If the first belongs to a loiter, the slope begins where the path leaves the circle.
     first_altitude, last_altitude: altitudes at these waypoints, m AMSL; None if the terrain there is unknown.
     """
-    waypoint_place = requirements.waypoint(last)
+    waypoint_place = requirements.waypoint_place(last)
     distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())
     if first_altitude is None or last_altitude is None:
         return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")

@@ -179,7 +179,7 @@ def _sphere_finding(
             time = aligned.track.time
             k = max(0, min(len(time) - 2, int(np.searchsorted(time, flown_visit.closest_time, side="right")) - 1))
             fraction = float((flown_visit.closest_time - time[k]) / (time[k + 1] - time[k]))
-            leg = requirements.leg(aligned.leg_at(k))
+            leg = requirements.leg_place(aligned.leg_at(k))
             facts += f" on {place_text(leg)} {aligned.position_text(k, fraction)}"
     flown_time = None if flown_visit is None else flown_visit.time_inside
     if place.kind == "radar":

@@ -15,7 +15,7 @@ import numpy as np
 from flight.mission.ground_phases import Approach
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.ground_paths import first_hazard_on_path, track_path
+from logs.verdict.measures.ground_paths import hazard_on_path, track_path
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -73,11 +73,11 @@ def touchdown_findings(
         faults = [] if planned_approach is None else _short_strip_messages(planned_approach)
         if planned_approach is None or not faults:
             return []
-        place = requirements.waypoint(planned_approach.leg + 1)
+        place = requirements.waypoint_place(planned_approach.leg + 1)
         reason = finding_reason(faults)
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=faults, check=GROUND_PATH)]
     approach = ground_phases.procedures.approach
-    place = ground_phases.whole_route.waypoint(approach.leg + 1)
+    place = ground_phases.whole_route.waypoint_place(approach.leg + 1)
     track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
     if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
         reason = "the flight did not reach its landing"
@@ -109,7 +109,7 @@ def touchdown_findings(
         point_height=point_height
     )
     faults = _detect_faults(approach, landing)
-    if entered_hazard := first_hazard_on_path(requirements, track_path(track)):
+    if entered_hazard := hazard_on_path(requirements, track_path(track)):
         faults.append(message(f"the final approach enters {entered_hazard}"))
     has_gusts = requirements.setup.scenario.wind.turbulence != "none"
     return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]

@@ -63,7 +63,7 @@ def _turn_finding(
     limit = max(limit, 0.0)
     if requirements.runs[waypoint - 1 : waypoint + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
-        return make_finding("turn", requirements.waypoint(waypoint), ok=None, reason=reason, unit="deg")
+        return make_finding("turn", requirements.waypoint_place(waypoint), ok=None, reason=reason, unit="deg")
     faults, facts, check, judged_turn = _judge_planned_turn(requirements, waypoint, limit, source)
     # With a known aircraft, the planned turn is compared with its limits, and the flown turn is only described.
     is_judged_as_planned = measure is None or bool(requirements.envelope)
@@ -105,7 +105,7 @@ def _turn_finding(
         measured_facts = [Fact(quantity, value, unit) for quantity, value, unit in quantities if value is not None]
     return make_finding(
         "turn",
-        requirements.waypoint(waypoint),
+        requirements.waypoint_place(waypoint),
         ok=ok,
         reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -190,7 +190,7 @@ def _unflown_turn_text(
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
     radius, _ = acceptance_limit(requirements, leg + 1)
     return (
-        f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg(leg))} for only"
+        f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg_place(leg))} for only"
         f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
         f" {radius:.0f} m"
     )

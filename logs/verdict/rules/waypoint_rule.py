@@ -67,7 +67,7 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         )
     return make_finding(
         "waypoint",
-        requirements.waypoint(waypoint),
+        requirements.waypoint_place(waypoint),
         ok=not faults,
         reason=finding_reason(faults) if faults else fact,
         faults=faults,
@@ -123,7 +123,7 @@ def _flown_finding(
         if math.isfinite(crossing_offset):
             reason += f"; the line across the leg at the waypoint was crossed {crossing_offset:.0f} m to the side"
         if waypoint > 0 and not aligned.passed[waypoint]:
-            last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
+            last_leg = requirements.leg_place(aligned.leg_at(len(aligned.track) - 1))
             text = f": the flight ended on {place_text(last_leg)} {math.hypot(distance, height_error):.0f} m away"
             faults = [message("not reached", text)]
             ok, reason = False, finding_reason(faults)
@@ -139,7 +139,7 @@ def _flown_finding(
             reason = f"missed: {reason}; {condition_text}{error_text}"
     return make_finding(
         "waypoint",
-        requirements.waypoint(waypoint),
+        requirements.waypoint_place(waypoint),
         ok=ok,
         reason=reason,
         faults=faults,

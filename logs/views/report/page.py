@@ -27,8 +27,8 @@ from logs.verdict.presentation import (
     RESULT_COLUMNS,
     count_sentence,
     finding_words,
+    limit_violation_text,
     method_text,
-    missed_text,
     number_texts,
     state_text,
 )
@@ -296,7 +296,7 @@ def _render_page(
         verdict=verdict,
         texts={
             "method": method_text,
-            "missed": missed_text,
+            "missed": limit_violation_text,
             "numbers": number_texts,
             "state": state_text,
             "words": finding_words,
@@ -317,7 +317,7 @@ def _render_page(
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
         passage_columns=tables.PASSAGE_COLUMNS,
-        passages=tables.passage_rows(setup, track),
+        sphere_stays=tables.passage_rows(setup, track),
         saturation=tables.saturation_rows(setup, track),
         scenario=tables.scenario_facts(setup),
         flight=tables.flight_facts(setup, end_reason or ""),
