@@ -92,7 +92,7 @@ def link(args: argparse.Namespace) -> int:
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
     """Return the answer of ``planfly link`` for --json."""
     from logs.verdict.conditions import judging_conditions
-    from logs.verdict.returns.returns_text import headline
+    from logs.verdict.returns.returns_text import returns_headline
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry
 
     outages = () if result.along is None else result.along.outages
@@ -115,6 +115,6 @@ def _json_answer(source: str, result: "LinkResult", code: int) -> object:
         facts={fact.what: fact.value for fact in result.finding.facts},
         where=result.where,
         outages=entries,
-        returns=None if result.returns is None else headline(result.returns),
+        returns=None if result.returns is None else returns_headline(result.returns),
         files=[str(path) for path in result.files],
     )

@@ -119,7 +119,8 @@ def altitude_source_text(imported_log: ImportedLog) -> str:
     """Describe the source and the datum of a log's altitudes, and how far other altitudes differ at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
-    >>> altitude_source_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
+    >>> heights = Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))
+    >>> altitude_source_text(ImportedLog("a.BIN", "", "", heights=heights))
     'from POS, above mean sea level, according to the log; other heights differ at the start: GPS.Alt by -0.1 m'
     """
     offsets = ", ".join(f"{height.name} by {height.offset:+.1f} m" for height in imported_log.heights.offsets)

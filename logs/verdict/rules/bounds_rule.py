@@ -1,4 +1,4 @@
-"""The bounds rule: judge the minimum distance inside the area's box, its floor and its ceiling."""
+"""The bounds rule: judge how far the path stays inside the area's edges, above its floor and below its ceiling."""
 
 import math
 
@@ -18,7 +18,10 @@ from world.arrays import Floats
 def bounds_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum distance from the area's edges, floor and ceiling, with one finding."""
+    """Judge with one finding the minimum distance inside the area's edges, floor and ceiling.
+
+    The finding is not judged for a mission without a scenario, which has no area.
+    """
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"

@@ -92,9 +92,10 @@ class _Obstacles(NamedTuple):
 
 
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, altitude: float) -> tuple[float, float]:
-    """Return the nominal and the certain maximum climb slope on a course, m per m.
+    """Return the nominal and the certain maximum climb slope on a course at a leg's airspeed, m per m.
 
     The certain slope is the nominal slope reduced by the uncertainty of the aircraft's model.
+
     course: rad.
     altitude: m AMSL.
     """
@@ -233,7 +234,7 @@ def _take_off_climb(
     altitudes: tuple[float, float],
     slope: float,
 ) -> _Climb:
-    """Return the take-off climb with a given slope (m per m).
+    """Lay out the take-off climb with a given slope (m per m), and find the obstacles on it.
 
     start: east and north of home, m.
     altitudes: altitudes of the ground at home and of the end of the take-off, m AMSL.
@@ -251,9 +252,9 @@ def _take_off_climb(
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
-    """Return the obstacles on a path from home.
+    """Find the obstacles on a path from home.
 
-    Height above ground is not checked on the first `LAUNCH_RUN_M`.
+    The height above ground is not checked on the first `LAUNCH_RUN_M`; it is inf on a path that is no longer.
     """
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = hazard_on_path(requirements, path)
@@ -362,7 +363,11 @@ def _degrees_text(slope: float) -> str:
 def _clear_courses_text(
     requirements: RouteRequirements, home_position: tuple[float, float], ground_altitude: float, top_altitude: float
 ) -> str:
-    """Describe the widest range of launch courses on which the climb is clear of obstacles."""
+    """Describe the widest range of launch courses on which the steepest climb is clear of obstacles.
+
+    home_position: east and north, m.
+    ground_altitude, top_altitude: altitudes of the ground at home and of the end of the climb, m AMSL.
+    """
 
     def is_clear(course: float) -> bool:
         """Return True if a launch on a course (rad) climbs to the take-off's altitude without obstacles."""
@@ -504,9 +509,10 @@ def _clearance_text(obstacles: _Obstacles) -> str:
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
-    """Make the finding on the clearance of a climb-out or an approach above ground.
+    """Make the finding on a climb-out or an approach, with its height above ground as the number.
 
-    ok: None if undecided.
+    rule: "climbout" or "approach".
+    ok: None if the finding is not judged.
     outcome: message with the reason; it is a fault unless the finding passes.
     check: see `logs.verdict.findings.Finding`.
     """

@@ -29,7 +29,7 @@ def corridor_findings(
 
 
 def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    """Judge the greatest distance of the flight, or of the planned turns if ``geometric``, from a leg."""
+    """Judge the largest distance of one leg's flown track, or of its planned turns if ``geometric``, from the legs."""
     limit, source = corridor_limit(requirements, leg)
     planned_distance, flown_distance, ok = float(turn_deviations(requirements, leg).max()), math.nan, None
     faults, facts = [], []

@@ -1,9 +1,9 @@
 """The launch rule: judge a flown take-off, from rail, hand or runway to the start of the first leg.
 
-The rule compares the launch acceleration with the acceleration that starts the motor, and judges the height lost after
-the launch, the runway remaining at lift-off, and the hazards (ground, missile spheres and zones) to the climb on the
-course that the autopilot holds.  The take-off and climb-out rules judge a take-off that is not flown, from the
-mission's items.
+The rule compares the launch acceleration with the acceleration that starts the motor.  It judges the height lost after
+the launch, the runway left at lift-off, and the hazards on the climb (ground, missile spheres and zones) on the course
+that the autopilot holds.  A take-off that is not flown is judged from the mission's items by the take-off and climb-out
+rules.
 """
 
 import math
@@ -36,7 +36,8 @@ def launch_findings(
 ) -> list[Finding]:
     """Judge a flown take-off with one finding; return [] if no take-off was flown.
 
-    It is judged by its motor start, height reached and lost, runway, ground clearance and hazards.
+    The finding covers the start of the motor, the height reached, the height lost after the launch, the runway left,
+    and hazards on the climb.
     """
     ground, terrain = requirements.ground_phases, requirements.setup.scenario.terrain
     if ground is None or ground.procedures.take_off is None:
@@ -111,9 +112,10 @@ def launch_findings(
 
 
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
-    """Return the minimum height above ground after the launch run, m, and its distance along the path, m.
+    """Return the minimum height above ground after the launch run, m, and the distance along the path there, m.
 
-    The height is inf if the take-off ends within the launch run, and NaN without terrain.  The distance is then NaN.
+    The launch run is the first `LAUNCH_RUN_M`, or on a runway all of the path up to lift-off if that is longer.  The
+    height is inf if the take-off ends within it, and NaN without terrain; the distance is then NaN.
     """
     terrain, (position, distances) = requirements.setup.scenario.terrain, path
     if terrain is None:

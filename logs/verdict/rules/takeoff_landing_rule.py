@@ -1,10 +1,10 @@
-"""The take-off and landing rules: judge the climb to a mission's first place, and its final approach.
+"""The take-off and landing rules: judge the slopes of the climb to the take-off waypoint and of the final approach.
 
-A flight begins and ends in the air, so both are judged from only the mission's places, whether or not the mission was
-flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than the
-aircraft can climb is not judged, because QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and
-autopilots continue to climb.  Any part of a mission's own take-off or landing that is not judged leaves the verdict
-undecided, and so does a slope that is close to the limit of an uncertain model of the aircraft.
+A simulated flight usually begins and ends in the air, so both are judged from the mission's items, whether or not the
+mission was flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper
+than the aircraft can climb is undecided, because QGroundControl draws a climb-out of 30 degrees (its
+TakeoffMissionItem), and autopilots continue to climb.  Any part of a mission's own take-off or landing that is not
+judged leaves the verdict undecided, and so does a slope that is close to the limit of an uncertain aircraft model.
 """
 
 import math
@@ -20,7 +20,7 @@ from logs.verdict.suggestions import suggest_gentler_landing
 from logs.verdict.tolerances import LEVEL_SLOPE_RAD, PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 
-# Verb, by rule, that says which end of a flight is in the air if the phase is not flown.
+# Verb, by rule, for the text that a flight begins or ends in the air if the phase is not flown.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
 _PHASE_TITLES = {"takeoff": "take-off", "landing": "landing"}
 # Check, by rule, of a slope that is undecided because the aircraft's model is uncertain.
@@ -32,9 +32,11 @@ _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the climb from home to the take-off item's waypoint; [] without a take-off item.
+    """Judge the slope of the climb from home to the take-off item's waypoint.
 
-    Return [] also if the take-off was flown, because the launch rule then judges it.
+    With a launch in the scenario, the climb to the next waypoint is judged if the item has no position of its own, and
+    a launch too gentle to start the motor fails.  Return [] without a take-off item on the ground, and for a flown
+    take-off, which the launch rule judges.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.take_off is not None:
         return []
@@ -89,10 +91,10 @@ def takeoff_findings(
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope from the last waypoint to the landing; return [] without a landing item.
+    """Judge the slope from the last waypoint before the landing to the landing point.
 
-    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] also for a flown landing,
-    which the touchdown rule judges.
+    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] without a landing item, and
+    for a flown landing, which the touchdown rule judges.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []

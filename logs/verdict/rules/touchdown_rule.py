@@ -66,7 +66,10 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing; before a flight, only report a strip too short to be judged."""
+    """Judge a flown landing with one finding; before a flight, only report a strip that is too short to be judged.
+
+    Return [] without a flown landing, unless ``geometric`` and the planned strip is too short.
+    """
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
         planned_approach = requirements.setup.ground_phases.approach if geometric else None
@@ -120,8 +123,9 @@ def _measure_landing(
 ) -> _Landing:
     """Measure a landing: touchdown, stop, sink rates, and lowest clearance of the final approach.
 
+    The result's `point_height` remains NaN.
+
     touchdown_row: row of the track in which the aircraft touches down.
-    The result's `point_height` is not set and remains NaN.
     """
     position = np.asarray(track.position, dtype=np.float64)
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
@@ -162,7 +166,8 @@ def _landing_finding(
 ) -> Finding:
     """Make the finding on a measured landing.
 
-    The finding fails if there are `faults`.  It is undecided if the simulation is too inaccurate to decide it.
+    It fails if there are `faults`; without faults, it is undecided if the simulation is too inaccurate to pass it.
+
     has_gusts: True if the air is turbulent.
     """
     # Parts of the landing that the simulation is too inaccurate to decide.
@@ -227,7 +232,7 @@ def _landing_finding(
 
 
 def _landing_point_text(approach: Approach) -> str:
-    """Return the mission item of the landing point as text."""
+    """Name the mission item of the landing point."""
     return f"item {approach.item}"
 
 

@@ -1,4 +1,4 @@
-"""The turn rule: judge whether each corner can be flown on its legs, and how it was flown."""
+"""The turn rule: judge whether the turn at each corner fits its legs, and how it was flown."""
 
 import math
 
@@ -34,9 +34,9 @@ from world.geometry import fly_by_offset
 def turn_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Return a finding for the turn at each inner waypoint, except at the waypoints of turnarounds.
+    """Judge the turn at each inner waypoint, except at the waypoints of turnarounds.
 
-    If ``geometric``, judge only the route, without a flight.
+    If ``geometric``, judge only the planned turns.
     """
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
@@ -53,9 +53,9 @@ def turn_findings(
 def _turn_finding(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
-    """Return the finding for the turn at a waypoint.
+    """Judge the turn at a waypoint; a turn next to a vertical leg is not judged.
 
-    measure: measurements of the flown turn; None before a flight.
+    measure: measurements of the flown turn; None to judge only the planned turn.
     """
     planned_turn = abs(float(requirements.turns[waypoint]))
     limit, source = turn_limit(requirements, waypoint)
@@ -127,8 +127,10 @@ def _judge_planned_turn(
 ) -> tuple[list[Message], list[str], str, float | None]:
     """Judge the planned turn at a waypoint by its limit (rad).
 
-    Return faults, facts, a check (`UNKNOWN_AIRCRAFT` or ""), and the turn (rad).  The turn is None for a negligible
-    kink.
+    Return faults, texts on the turn, a check (`UNKNOWN_AIRCRAFT` or ""), and the planned turn, rad.  A negligible kink
+    is no fault, and its turn is returned as None.
+
+    source: source of the limit: "scenario" or "aircraft".
     """
     turn = abs(float(requirements.turns[waypoint]))
     turn_text = f"turns {math.degrees(turn):.1f}°"
@@ -197,7 +199,7 @@ def _unflown_turn_text(
 
 
 def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> list[tuple[str, str]]:
-    """Describe a flown turn, as pairs of a measured quantity's name and a text."""
+    """Describe a flown turn: pairs of the name of a measured quantity and a text on it."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(("course change", f"flown course change {math.degrees(measure.angle):.2f}°"))
@@ -220,9 +222,9 @@ def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMe
 def _flown_faults(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
 ) -> dict[str, Message]:
-    """Return the faults of a flown turn by quantity: names of `_flown_facts`, or "circles".
+    """Return the faults of a flown turn by measured quantity: a name as in `_flown_facts`, or "circles".
 
-    limit: largest course change, rad.
+    limit: largest permitted course change, rad.
     """
     faults, setup = {}, requirements.setup
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
