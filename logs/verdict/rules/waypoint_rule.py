@@ -190,7 +190,7 @@ def _closest_approach(
 def with_circles_in_reasons(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Return the findings, with the circles that the autopilot flew at its waypoints added to the reasons of failures."""
+    """Return the findings, and add to each failure's reason the circles that the autopilot flew at its waypoints."""
     circles = {} if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)
