@@ -106,7 +106,7 @@ class Finding:
 
     @property
     def state(self) -> State:
-        """State of the finding.
+        """State of the finding, as shown by signs and colors: "ok", "fail", "open" or "unjudged" (see `State`).
 
         >>> make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT).state
         'open'
@@ -152,9 +152,9 @@ class Finding:
 
     @property
     def nearest_distance(self) -> float | None:
-        """Distance from the nearest kill zone or airspace zone, m, negative inside it; None if unknown.
+        """Distance from the nearest kill zone or airspace zone, m, negative inside it, or None.
 
-        Only findings of the rules `threat` and `fence` have this fact.
+        It is the fact "nearest", which only findings of the rules `threat` and `fence` may have.
         """
         return next((fact.value for fact in self.facts if fact.what == "nearest"), None)
 
@@ -219,7 +219,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """Message of a rule.
+    """Statement of a rule, from which the reason of a finding is made.
 
     text: full text.
     brief: first part of the text, for a headline.

@@ -187,7 +187,7 @@ class RuleFindings:
         )
 
     @property
-    def judged(self) -> int:
+    def judged_count(self) -> int:
         """Number of findings that were judged."""
         return sum(finding.ok is not None for finding in self.findings)
 
@@ -208,7 +208,7 @@ class RuleFindings:
         return min(undecided_findings(self.findings), key=worst_first_key) if self.state == "open" else self.closest
 
     @property
-    def passed_otherwise(self) -> tuple[Finding, ...]:
+    def passed_beyond_limit(self) -> tuple[Finding, ...]:
         """Findings that pass although their number is beyond the limit; their reason explains it."""
         return tuple(
             finding
@@ -219,14 +219,16 @@ class RuleFindings:
     @property
     def count_text(self) -> str:
         """Text such as "3 of 4 ok": the number of passed findings, and the number of judged findings."""
-        return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
+        return (
+            f"{self.judged_count - len(self.failed)} of {self.judged_count} ok" if self.judged_count else "not judged"
+        )
 
     @property
     def tally_text(self) -> str:
         """Text such as "2 of 3 fail, 1 not judged" or "3 ok": the numbers of findings, for a cell of a table."""
-        failed_count, unjudged_count = len(self.failed), len(self.findings) - self.judged
-        judged_text = f"{failed_count} of {self.judged} fail" if failed_count else f"{self.judged} ok"
-        parts = [judged_text if self.judged else "", f"{unjudged_count} not judged" if unjudged_count else ""]
+        failed_count, unjudged_count = len(self.failed), len(self.findings) - self.judged_count
+        judged_text = f"{failed_count} of {self.judged_count} fail" if failed_count else f"{self.judged_count} ok"
+        parts = [judged_text if self.judged_count else "", f"{unjudged_count} not judged" if unjudged_count else ""]
         return ", ".join(filter(None, parts))
 
     @property
@@ -238,14 +240,12 @@ class RuleFindings:
         worst_finding = self.failed[0]
         if len(self.failed) == 1:
             return finding_heading(worst_finding)
-        return (
-            f"{self.words.word}: {len(self.failed)} of {self.judged} places fail; the worst is at {worst_finding.where}"
-        )
+        return f"{self.words.word}: {len(self.failed)} of {self.judged_count} places fail; the worst is at {worst_finding.where}"
 
     @property
     def cells(self) -> tuple[str, ...]:
         """Row of the rule in a table with `RESULT_COLUMNS`; a rule that was not judged has its reason as place."""
-        place = self.shown.where if self.shown else "" if self.judged else self.findings[0].reason
+        place = self.shown.where if self.shown else "" if self.judged_count else self.findings[0].reason
         numbers = number_texts(self.shown) if self.shown else NumberTexts()
         return (self.words.word, state_text(self.state), self.tally_text, place, *numbers)
 

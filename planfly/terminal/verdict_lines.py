@@ -93,13 +93,13 @@ def _rule_summary(rule: RuleFindings) -> str:
 
     If no finding of the rule was judged, the text states the reason.
     """
-    if not rule.judged:
+    if not rule.judged_count:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
         # Of several such findings the first stands for all.
         return "; ".join(
-            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_otherwise[:1])]
+            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_beyond_limit[:1])]
         )
     value, limit = closest.compared_texts()
     if not value or not limit:

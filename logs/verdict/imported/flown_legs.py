@@ -91,7 +91,7 @@ def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
 
 
 def stretch_end_text(stretch: MissionStretch) -> str:
-    """Describe how a stretch ended."""
+    """Describe how a stretch ended: by a change of mode, the end of the flight, or the end of the log."""
     if stretch.ended == "mode":
         return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
     if stretch.ended == "landed":
@@ -156,19 +156,19 @@ _MAX_NAMED = 6
 class PlanMismatch:
     """Reason why a flight did not follow a plan.
 
-    kind: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
+    reason: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
     distance: for "place", the minimum distance of the flight from a waypoint, m.
     order: for "order", the items of the first waypoints in the order in which they were passed.
     """
 
-    kind: str
+    reason: str
     distance: float = 0.0
     order: tuple[int, ...] = ()
 
     @property
     def text(self) -> str:
         """Text of the reason."""
-        if self.kind == "place":
+        if self.reason == "place":
             distance_text = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
             return f"the flight is elsewhere, at least {distance_text} from every waypoint"
         return f"the flight passed its items in another order: {', '.join(map(str, self.order))}, ..."

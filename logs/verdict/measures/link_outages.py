@@ -52,7 +52,7 @@ class LinkAlongPath:
         return bool(np.isfinite(self.points.margin).all())
 
     @property
-    def worst(self) -> int:
+    def worst_point(self) -> int:
         """Index of the point with the smallest known margin; -1 if no margin is known."""
         margin = self.points.margin
         return int(np.nanargmin(margin)) if np.isfinite(margin).any() else -1

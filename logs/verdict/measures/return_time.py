@@ -59,7 +59,7 @@ def _path_length(places: Floats) -> float:
     return float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
 
 
-def remaining_time(
+def remaining_battery_time(
     requirements: RouteRequirements, failsafe: ReturnTimeFailsafe, energy: float, power_factor: float
 ) -> float:
     """Return a lower bound on the remaining battery time that the autopilot estimates after a flight, s.

@@ -317,12 +317,12 @@ class FlownGround:
     landing_start_row: int
 
     @property
-    def launch(self) -> Track:
+    def takeoff_track(self) -> Track:
         """Track of the take-off."""
         return self.track.rows(0, self.takeoff_end_row + 1)
 
     @property
-    def landing(self) -> Track:
+    def landing_track(self) -> Track:
         """Track of the landing."""
         return self.track.rows(self.landing_start_row, len(self.track))
 

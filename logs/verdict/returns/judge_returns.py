@@ -139,7 +139,7 @@ class SimulatedReturn:
 
     @property
     def safe(self) -> bool:
-        """True if the return is safe."""
+        """True if the outcome of the return is "safe"."""
         return self.kind == "safe"
 
 
@@ -249,7 +249,7 @@ class Returns:
         return sum(ret.starts_too_low for ret in self.each)
 
     def count(self, kind: Kind) -> int:
-        """Return the number of returns with this outcome."""
+        """Return the number of returns whose outcome is `kind`."""
         return sum(ret.kind == kind for ret in self.each)
 
     @property
@@ -403,7 +403,7 @@ class ReturnWorld:
 
     @property
     def is_simulated(self) -> bool:
-        """True if returns are simulated at all."""
+        """True if returns are simulated; False if the autopilot's RTL cannot be simulated for this mission."""
         return not self.autopilot.returns.unsimulated_text(self.mission)
 
     @property

@@ -18,7 +18,7 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.return_time import longest_return_time, remaining_time
+from logs.verdict.measures.return_time import longest_return_time, remaining_battery_time
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     leg_energies,
@@ -247,7 +247,7 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
         # The battery's remaining time may trigger an early return.  It is shortest at the end of the mission, and is
         # compared with the time of the longest return, so that the result holds at all times of the mission.
         factor = math.exp(UNDECIDED_FRACTION * setup.envelope.power_sd)
-        remaining = remaining_time(requirements, return_failsafe, factor * energy_used, factor)
+        remaining = remaining_battery_time(requirements, return_failsafe, factor * energy_used, factor)
         return_time = longest_return_time(requirements, return_failsafe)
         needed = return_failsafe.time_factor * return_time + return_failsafe.time_margin
         reason = (

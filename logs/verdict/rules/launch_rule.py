@@ -42,7 +42,7 @@ def launch_findings(
     ground, terrain = requirements.ground_phases, requirements.setup.scenario.terrain
     if ground is None or ground.procedures.take_off is None:
         return []
-    take_off, track = ground.procedures.take_off, ground.launch
+    take_off, track = ground.procedures.take_off, ground.takeoff_track
     position, distances = path = track_path(track)
     height_lost = float(position[0, 2] - position[:, 2].min())
     clearance, distance = _climb_clearance(requirements, path)

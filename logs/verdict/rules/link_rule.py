@@ -125,7 +125,11 @@ def judge_link(
     elif judged_link.outages and not reactions:
         setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
         reaction_text = f". If the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
-    leg = None if judged_link.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged_link)
+    leg = (
+        None
+        if judged_link.worst_point < 0
+        else _worst_leg(requirements, aligned if not geometric else None, judged_link)
+    )
     text = _link_text(judged_link, leg)
     finding = _link_finding(
         link, (planned, judged_link), outages, reactions, (text, reaction_text), geometric=geometric
@@ -208,7 +212,7 @@ def _link_text(link_along_path: LinkAlongPath, leg: Place | None) -> str:
 
     leg: leg of the smallest margin; None if no margin is known.
     """
-    k = link_along_path.worst
+    k = link_along_path.worst_point
     if leg is None:
         return "the terrain below the radio path is unknown"
     points, (east, north) = link_along_path.points, link_along_path.positions[k, :2].tolist()
@@ -259,7 +263,7 @@ def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, li
 
     aligned: flown track; None for the planned path.
     """
-    time, phases = float(link_along_path.time[link_along_path.worst]), requirements.ground_phases
+    time, phases = float(link_along_path.time[link_along_path.worst_point]), requirements.ground_phases
     if aligned is None:
         path = requirements.path
         segment = int(np.searchsorted(path.times, time, side="right")) - 1
@@ -296,9 +300,9 @@ def _link_finding(
     if ok and not judged.is_known:
         ok = None
     (text, reaction_text), points, facts = texts, judged.points, []
-    if judged.worst >= 0:
+    if judged.worst_point >= 0:
         facts = [
-            Fact("smallest margin left after the fade margin", float(points.margin[judged.worst]), "dB"),
+            Fact("smallest margin left after the fade margin", float(points.margin[judged.worst_point]), "dB"),
             Fact("time below the fade margin", judged.time_below_margin, "s"),
             Fact("greatest distance from the station", float(points.distance.max()), "m"),
             Fact("least clearance in radii of the first Fresnel zone", float(np.nanmin(points.fresnel_clearance)), ""),

@@ -81,7 +81,7 @@ def touchdown_findings(
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=faults, check=GROUND_PATH)]
     approach = ground_phases.procedures.approach
     place = ground_phases.whole_route.waypoint_place(approach.leg + 1)
-    track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
+    track, terrain = ground_phases.landing_track, requirements.setup.scenario.terrain
     if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
         reason = "the flight did not reach its landing"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
