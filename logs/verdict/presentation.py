@@ -240,7 +240,8 @@ class RuleFindings:
         worst_finding = self.failed[0]
         if len(self.failed) == 1:
             return finding_heading(worst_finding)
-        return f"{self.words.word}: {len(self.failed)} of {self.judged_count} places fail; the worst is at {worst_finding.where}"
+        count_text = f"{len(self.failed)} of {self.judged_count} places fail"
+        return f"{self.words.word}: {count_text}; the worst is at {worst_finding.where}"
 
     @property
     def cells(self) -> tuple[str, ...]:
