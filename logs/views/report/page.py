@@ -317,7 +317,7 @@ def _render_page(
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
         passage_columns=tables.PASSAGE_COLUMNS,
-        sphere_stays=tables.passage_rows(setup, track),
+        passages=tables.passage_rows(setup, track),
         saturation=tables.saturation_rows(setup, track),
         scenario=tables.scenario_facts(setup),
         flight=tables.flight_facts(setup, end_reason or ""),
