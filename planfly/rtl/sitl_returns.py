@@ -98,7 +98,7 @@ class ProgramReturns:
         """Pairs whose return the program flew."""
         return tuple(pair for pair in self.pairs if pair.flown is not None)
 
-    def returns_headline(self) -> str:
+    def headline(self) -> str:
         """Return a one-line summary.
 
         >>> ProgramReturns("", ()).headline()
