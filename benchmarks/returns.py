@@ -19,7 +19,7 @@ from logs.verdict.returns.drawn_returns import drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.returns.suggest_returns import suggest_rally_points
 from planfly.rtl.jsbsim_returns import fly_return
 
@@ -57,7 +57,7 @@ def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
     found = judge_returns(world, starts, 0.0)
     low = [one.clearance for one in found.each]
     outside = [one.sphere_distance for one in found.each]
-    print(f"from {len(low)} fresh places by the model: {headline(found)}")
+    print(f"from {len(low)} fresh places by the model: {returns_headline(found)}")
     print(f"  below {world.limit:.0f} m: {sum(one < world.limit for one in low)}, least {min(low):.1f} m;", end=" ")
     print(f"inside a sphere: {sum(one <= 0.0 for one in outside)}, nearest {min(outside):.1f} m outside")
     rows = starts.rows[np.linspace(0, len(starts) - 1, whole).round().astype(int)] if whole else []
@@ -91,7 +91,7 @@ def main() -> None:
         f"returns {alone:.1f} s; with glides {alone + without:.1f} s; with the search {alone + search:.1f} s", end="; "
     )
     print(f"drawing needs {drawn:.1f} s more")
-    print(f"{headline(returns)}; {glides.count('home')} glide home, {glides.count('nothing')} nowhere")
+    print(f"{returns_headline(returns)}; {glides.count('home')} glide home, {glides.count('nothing')} nowhere")
     if rally is None or rally.rally is None:
         print("no rally points were found")
         return

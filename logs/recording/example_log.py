@@ -1,4 +1,4 @@
-"""Generate a flight by formula, to test readers, figures and reports without a simulator or a file."""
+"""Compute a flight log by formula, to test readers, figures and reports without a simulator or a file."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import scenario_from_spec
 
-# Waypoints of two legs with a turn of 14 degrees between them; east, north, up in m.
+# Waypoints of two legs with a turn of 14 degrees between them: east, north and up, m.
 _WAYPOINTS = np.array([[-500.0, 0.0, 200.0], [0.0, 0.0, 200.0], [400.0, 100.0, 220.0]])
 # Airspeed, m/s.
 _AIRSPEED = 25.0
@@ -93,9 +93,9 @@ def example_log() -> FlightLog:
 
 
 def write_example_log(path: Path) -> Path:
-    """Record the flight of `example_log` in a file, replacing an existing one; return its path.
+    """Record the flight of `example_log` in a file, which is replaced if it exists, and return its path.
 
-    Raises OSError.
+    Raises OSError if the file cannot be written.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

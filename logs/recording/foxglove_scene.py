@@ -1,4 +1,4 @@
-"""Build Foxglove messages for a 3-D viewer: terrain, threats, zones, plan, track and aircraft.
+"""Encode Foxglove messages for a 3-D viewer: terrain, threats, zones, plan, track, returns and aircraft.
 
 The frame `map` has the scenario's axes east, north and up (AMSL) in metres; `aircraft` has forward, left, up.
 """
@@ -84,10 +84,10 @@ def timestamp(time_ns: int) -> Timestamp:
 
 
 def body_rotation(attitude: ArrayLike) -> Floats:
-    """Convert roll, pitch and yaw to quaternions (..., 4): x, y, z, w.
+    """Convert roll, pitch and yaw to quaternions x, y, z, w, (..., 4).
 
-    The quaternion rotates from forward, left, up to east, north, up.  After the change of axes from north-east-down the
-    angles are roll, -pitch and pi/2 - yaw about forward, left and up.
+    A quaternion rotates from forward, left, up to east, north, up.  After the change of axes from north-east-down, the
+    angles are roll, -pitch and pi/2 - yaw about the axes forward, left and up.
 
     attitude: roll, pitch and yaw (clockwise from north), rad, (..., 3).
     """
@@ -116,7 +116,10 @@ def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> L
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the ground of the area as a coloured mesh with up to `MAX_VERTICES` vertices per side."""
+    """Encode the ground of the area as a SceneUpdate: a coloured mesh with up to `MAX_VERTICES` vertices per side.
+
+    Without terrain, or without known heights, the scene is empty.
+    """
     entity = _entity(time_ns, "terrain").SerializeToString(deterministic=True)
     if scenario.terrain is None:
         return length_delimited(2, entity)
@@ -143,9 +146,11 @@ def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
 
 
 def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return vertices (m) and colours of the ground's mesh, (n, m, 3) each, and a mask (n, m).
+    """Return the vertices of the ground's mesh, m, their colours, 0 to 1, and a mask of vertices with known height.
 
-    The mask is True for vertices with known height.
+    Vertices and colours have shape (n, m, 3), the mask (n, m).  A vertex of unknown height has the lowest known height.
+
+    bounds: range of the area to the east and to the north, m, (2, 2).
     """
 
     def axis(min_value: float, max_value: float) -> Floats:
@@ -166,7 +171,7 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
-    """Return the mesh's vertices of known height (m) and their colours (0..1), (n, 3) each."""
+    """Return the vertices of the ground's mesh that have a known height, m, and their colours, 0 to 1, (n, 3) each."""
     if scenario.terrain is None:
         return np.zeros((0, 3)), np.zeros((0, 3))
     points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
@@ -174,7 +179,7 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
-    """Encode the spheres of missiles and radars, and their names above the ground around them."""
+    """Encode the spheres of missiles and radars as a SceneUpdate, with their names above the ground around them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         center = threats.position[k]
@@ -215,7 +220,7 @@ def _make_label(position: Floats, name: str) -> TextPrimitive:
 
 
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
-    """Encode the plan as a scene: legs as a line, waypoints as dots with numbers and mission items.
+    """Encode the plan as a SceneUpdate: legs as a line, and waypoints as dots with their numbers and mission items.
 
     waypoints: (w, 3), m.
     items: number of each waypoint's mission item, negative for none, (w,).
@@ -233,7 +238,7 @@ def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
 
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
-    """Encode the track flown so far as a line.
+    """Encode the track flown so far as a SceneUpdate with a line.
 
     positions: m, (n, 3).
     """
@@ -284,9 +289,11 @@ def _points(points: Floats) -> Iterable[Point3]:
 
 
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
-    """Encode names and edges of zones, from the ground or the floor up to the ceiling or above the path.
+    """Encode the zones of a scenario as a SceneUpdate: their edges and names.
 
-    waypoints: m, (w, 3).
+    A zone is drawn from its floor, or from the ground, up to its ceiling, or to 50 m above the path if it has none.
+
+    waypoints: waypoints of the path, m, (w, 3).
     """
     entity = _entity(time_ns, "zones")
     min_altitude = float(waypoints[:, 2].min())
@@ -305,9 +312,10 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Encode judged returns: the path coloured by their outcome, the worst returns, the glide footprint.
+    """Encode judged returns to launch as a SceneUpdate.
 
-    The coloured line is drawn below the path, so that plan and track stay visible.
+    It shows the path, coloured by the outcome of the returns from it, the worst returns, and the glide footprint.  The
+    coloured line is drawn below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
     for kind, segment in drawn_returns.segments_by_outcome:
@@ -402,7 +410,7 @@ def model_colours() -> Singles:
 
 
 def aircraft_glb() -> bytes:
-    """Encode the aircraft model as a `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
+    """Encode the aircraft model as the bytes of a `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
     pieces = b""
     views: list[dict[str, Any]] = []
     accessors, primitives, materials = [], [], []
@@ -444,7 +452,7 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """Encode the aircraft model in the aircraft's frame, which the log's transforms move."""
+    """Encode the aircraft model as a SceneUpdate in the aircraft's frame, which the log's transforms move."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=MODEL_SPAN_M, y=MODEL_SPAN_M, z=MODEL_SPAN_M),

@@ -1,4 +1,4 @@
-"""Moving parts of 3-D views: pose, track, events, and point clouds for viewers without meshes."""
+"""Encode the moving parts of 3-D views (pose, track, events), and point clouds for viewers without meshes."""
 
 import math
 from collections.abc import Iterator
@@ -53,7 +53,7 @@ THINNED_POINT_COUNT = 64
 
 
 class GrowingTrack:
-    """Points of the track flown so far, oldest first."""
+    """Points of the track flown so far, oldest first, thinned so that their number stays bounded."""
 
     def __init__(self) -> None:
         self._points = np.zeros((MAX_POINTS + 1, 3))
@@ -105,16 +105,16 @@ def thin_line(points: Floats, point_count: int) -> Floats:
 # ----------------------------------------------------------------------
 # Events in flight, recorded when they happen: starts of legs, entries into and exits from the ranges of threats.
 
-# Name of the source of these events in the log.  They are not read back, because a timeline computes them itself.
+# Name of the source of these events in the log.  The reader skips them, because a timeline computes them itself.
 EVENT_SOURCE = "flight"
 # Interval between checks of threats, ns.
 _CHECK_INTERVAL_NS = 200_000_000
 
 
 class FlightEvents:
-    """Converter of flight events to Log messages.
+    """Detector of flight events, which encodes them as Log messages.
 
-    It remembers the last leg and the threats in range, so that the events do not depend on how the rows are split into
+    It stores the last leg and the threats in range, so that the events do not depend on how the rows are split into
     blocks.
     """
 
@@ -131,7 +131,9 @@ class FlightEvents:
         }
 
     def event_records(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
-        """Yield the event messages of rows: changes of leg, and entries into and exits from threats' ranges.
+        """Yield a message for each event in the next rows: a new leg, or an entry into or exit from a threat's range.
+
+        Ranges are checked once every `_CHECK_INTERVAL_NS`.
 
         log_times: log time of each row, ns, (n,).
         position: m, (n, 3).
@@ -168,7 +170,7 @@ class FlightEvents:
             self._inside[kind] = is_inside[-1]
 
     def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
-        """Make the message record of one event.
+        """Encode one event as a message record.
 
         time: log time, ns.
         """
@@ -203,15 +205,16 @@ _DETECTION_COLOUR = _colour_bytes("radar")
 _POINT_SPACING_M = 30.0
 # Maximum number of points of a line.
 _MAX_SAMPLES = 4000
-# Points of a sphere.
+# Number of points of a sphere.
 _SPHERE_POINTS = 150
-# Intervals along each side of a triangle.
+# Number of intervals along each side of a triangle.
 _SIDE_INTERVALS = 7
 
 
 def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
-    """Encode points (m, (n, 3)) as a PointCloud in a frame, rounded to 1/16 m.
+    """Encode points as a PointCloud in a frame, rounded to 1/16 m.
 
+    points: m, (n, 3).
     colours: red, green, blue and opacity, 0 to 255, (n, 4), or one colour for all points.
     """
     packed = np.zeros(len(points), dtype=_POINT_DTYPE)
@@ -239,7 +242,7 @@ def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.ui
 
 
 def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the vertices of the ground's mesh as a point cloud."""
+    """Encode the vertices of the ground's mesh that have a known height as a point cloud."""
     points, colours = terrain_points(scenario)
     shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
     return point_cloud(time_ns, MAP_FRAME, points, shades)
@@ -274,7 +277,7 @@ def aircraft_cloud(time_ns: int) -> bytes:
 
 
 def threats_cloud(time_ns: int, threats: Threats) -> bytes:
-    """Encode the spheres of missiles and radars as evenly distributed points."""
+    """Encode the spheres of missiles and radars as a point cloud, with evenly distributed points."""
     # A Fibonacci lattice: equal steps in height, each turned by the golden angle.
     k = np.arange(_SPHERE_POINTS) + 0.5
     height, angle = 1.0 - 2.0 * k / _SPHERE_POINTS, math.pi * (1.0 + math.sqrt(5.0)) * k
@@ -291,7 +294,10 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 
 
 def points_along_legs(waypoints: Floats) -> Floats:
-    """Return evenly spaced points, m, (n, 3), on the legs between waypoints (w, 3), which are included."""
+    """Sample the legs between waypoints (w, 3), m, at even spacing along each leg.
+
+    Return the points, m, (n, 3), including the waypoints.
+    """
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
     spacing = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [
@@ -302,7 +308,7 @@ def points_along_legs(waypoints: Floats) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# The moving parts of views: the pose five times a second, a fix each second, and the track.
+# The moving parts of views: a transform five times a second, a position fix each second, and the track.
 
 TF_TOPIC = "/tf"
 FIX_TOPIC = "/fix"
@@ -338,6 +344,7 @@ def transform_messages(channel: int, log_times: Ints, position: Floats, attitude
 
     Positions are rounded to 2^-10 m and quaternions to 2^-20, which is invisible and halves their size in the log.  The
     state message is exact.
+
     log_times: ns, (n,).
     position: m, (n, 3).
     attitude: roll, pitch and yaw, rad, (n, 3).
@@ -366,11 +373,11 @@ def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Flo
     return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(messages))
 
 
-class Poses:
-    """Converter of rows to the messages for viewers: transforms, fixes and the track."""
+class ViewerMessages:
+    """Encoder of the track's rows as messages for viewers: transforms, position fixes, and the track."""
 
     def __init__(self, origin: GeoOrigin, channels: dict[str, int]) -> None:
-        """Prepare for a map with this origin.
+        """Prepare for a flight on the map with this origin.
 
         channels: number of the channel of each topic.
         """
@@ -382,9 +389,10 @@ class Poses:
         self._next_cloud = 0.0  # s
 
     def pose_records(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
-        """Yield the messages of rows: a transform every 0.2 s, a fix each second, and the track.
+        """Yield the messages of the next rows: a transform every 0.2 s, a position fix each second, and the track.
 
-        The track as a line is written every `TRACK_INTERVAL_S` s, and the track as points at growing intervals.
+        The track is encoded as a line every `TRACK_INTERVAL_S`, and as points at growing intervals.  Rows with
+        non-finite numbers are skipped.
 
         log_times: log time of each row, ns, (n,).
         position: m, (n, 3).
@@ -419,7 +427,7 @@ class Poses:
                 yield self._track_cloud_record(log_time, [*self._path[:-1], start_positions[: k + 1]])
 
     def whole_track_records(self, log_time: int) -> Iterator[MessageRecords]:
-        """Yield the track up to the newest row, with a point each second, as a line and as points.
+        """Yield two messages with the track up to the newest row, with a point each second: as a line and as points.
 
         log_time: log time of the messages, ns.
         """
@@ -429,7 +437,7 @@ class Poses:
         yield self._track_cloud_record(log_time, parts)
 
     def _track_cloud_record(self, log_time: int, parts: list[Floats]) -> MessageRecords:
-        """Make the message with the track as points.
+        """Encode the track as points in a message record.
 
         parts: positions of successive parts of the track, m, (n, 3) each.
         """
@@ -440,6 +448,6 @@ class Poses:
 def _change_indices(values: Ints, previous: int) -> Ints:
     """Return the indices at which non-decreasing values increase.
 
-    previous: value before the first.
+    previous: value to which the first value is compared.
     """
     return np.flatnonzero(np.diff(values, prepend=previous) > 0)

@@ -1,4 +1,4 @@
-"""Read an MCAP container front to back without trusting it.
+"""Read an MCAP container from front to back without trusting its sizes and checksums.
 
 mcap 1.6's `StreamReader` would save 150 lines.  However, it reports a damaged attachment only at the end of the file,
 its seeking reader does not report it at all, and lz4 chunks decompress to any size.  Therefore this module reads the
@@ -60,11 +60,13 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
-    """Yield the records of each complete chunk, and records outside chunks, as bytes; fill `container`.
+    """Yield the records of each complete chunk as bytes, and fill a container with the attachments.
 
-    Damage raises no error; `Container.problem` describes it.
+    Records outside chunks are yielded in pieces of the same form.  Damage ends the reading without an error;
+    `Container.problem` then describes it.
 
-    file: file positioned after the magic at its start.
+    file: file, positioned after the magic at its start.
+    container: empty container, which is complete once all chunks have been read.
     """
     crc = zlib.crc32(MAGIC)
     total = 0
@@ -109,9 +111,10 @@ def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
-    """Check the CRC of the data section before its records outside chunks are used.
+    """Check the rest of the data section by its CRC before its records outside chunks are used.
 
-    Raises _Damage if it differs.
+    The file's position is restored.  Raises _Damage if the CRC differs or the section is damaged.
+
     crc: CRC of the section up to byte `start`; the part after it is read twice.
     """
     resume_position = file.tell()
@@ -131,7 +134,12 @@ def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
 
 
 def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
-    """Read one record; return its frame (opcode and length) and its content.  Raises _Damage."""
+    """Read one record; return its frame (opcode and length) and its content.
+
+    Raises _Damage if the file ends in the record, or if the record is larger than `RECORD_LIMIT`.
+
+    position: position of the record in the file, for messages.
+    """
     frame = file.read(FRAME.size)
     if len(frame) < FRAME.size:
         raise _Damage(f"the file ends at byte {position + len(frame):,}, before its end record")
@@ -144,8 +152,11 @@ def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
     return frame, content
 
 
-def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield opcode, offset and content of each record in a chunk.  Raises ValueError if a record is cut."""
+def chunk_records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Yield opcode, offset and content of each record in a chunk.
+
+    Raises ValueError for a record that reaches beyond the end of the chunk.
+    """
     position = 0
     while position < len(data):
         if position + FRAME.size > len(data):
@@ -164,7 +175,10 @@ def record_stream(content: bytes) -> ReadDataStream:
 
 
 def _read_chunk(content: bytes, position: int) -> bytes:
-    """Return the uncompressed records of a chunk, checked by its CRC.  Raises _Damage."""
+    """Decompress the records of a chunk, and check them by their CRC.
+
+    Raises _Damage for a chunk that cannot be read, or whose size or CRC is wrong.
+    """
     try:
         chunk = Chunk.read(record_stream(content))
     except PARSE_ERRORS as error:
@@ -194,7 +208,10 @@ def _read_chunk(content: bytes, position: int) -> bytes:
 
 
 def _read_attachment(content: bytes, position: int, container: Container) -> None:
-    """Check an attachment by its CRC, and add the attachment to the container.  Raises _Damage."""
+    """Check an attachment by its CRC, and add it to the container.
+
+    Raises _Damage if it cannot be read, if its CRC differs, or if its name is in the container already.
+    """
     try:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
@@ -226,7 +243,7 @@ def _check_data_end(content: bytes, position: int, crc: int) -> None:
 
 
 def _check_summary(file: BinaryIO) -> None:
-    """Check the CRC of the summary and the magic at the end of the file.  Raises _Damage."""
+    """Read the summary, and check its CRC and the magic at the end of the file; raise _Damage if one is wrong."""
     crc = 0
     while True:
         position = file.tell()

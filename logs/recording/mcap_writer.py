@@ -1,4 +1,4 @@
-"""Write an MCAP container front to back, from prepared chunks.
+"""Write an MCAP container from front to back, from prepared chunks.
 
 The `Writer` of mcap takes one message at a time, at 5 us each, which is two to three times the time of this writer.
 Its `Chunk` and `ChunkIndex` copy their fields through a record builder, which takes as long as the compression.  Here,
@@ -30,7 +30,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from logs.recording.mcap_reader import FRAME, MAGIC, record_stream, records
+from logs.recording.mcap_reader import FRAME, MAGIC, chunk_records, record_stream
 from world.arrays import Bytes, Floats, Ints
 from world.kernels import compiled, copy_into, inner
 
@@ -138,7 +138,7 @@ class ContainerWriter:
         self._write_bytes(MAGIC + _record_bytes(Header(profile=profile, library=profile)))
 
     def write_attachment(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
-        """Write an attachment, and note it for the summary.
+        """Write an attachment, and store its entry for the summary.
 
         log_time: ns since 1970.
         """
@@ -150,10 +150,10 @@ class ContainerWriter:
         self._write_bytes(record)
 
     def add_channel(self, topic: str, schema: str, data: bytes) -> int:
-        """Add a protobuf channel to the next chunk, and return its number.
+        """Add a protobuf channel, and its schema if it is new, to the next chunk; return the channel's number.
 
-        schema: full name of the message.
-        data: FileDescriptorSet of the message.
+        schema: full name of the channel's message type.
+        data: serialized FileDescriptorSet of this type.
         """
         if schema not in self._schemas:
             self._schemas[schema] = Schema(id=len(self._schemas) + 1, data=data, encoding="protobuf", name=schema)
@@ -164,10 +164,7 @@ class ContainerWriter:
         return channel.id
 
     def pop_new_records(self) -> bytes:
-        """Return the records of schemas and channels that no chunk contains yet, for the next chunk.
-
-        Each record is returned only once.
-        """
+        """Return the records of schemas and channels added since the last call, which begin the next chunk."""
         new_records = b"".join(_record_bytes(record) for record in self._unwritten_records)
         self._unwritten_records.clear()
         return new_records
@@ -175,10 +172,11 @@ class ContainerWriter:
     def copy_chunk(self, data: bytes) -> None:
         """Write the records of another file's chunk as a chunk of this file.
 
-        The chunk's schemas and channels are added to this file.  Raises ValueError and the errors of mcap's classes.
+        The chunk's schemas and channels are added to this file.  Raises one of
+        `logs.recording.mcap_reader.PARSE_ERRORS` for records that cannot be read.
         """
         index: dict[int, list[tuple[int, int]]] = {}
-        for opcode, position, content in records(data):
+        for opcode, position, content in chunk_records(data):
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(record_stream(content))
                 self._schemas.setdefault(f"{schema.id}", schema)
@@ -259,14 +257,14 @@ class ContainerWriter:
         self._write_bytes(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
 
     def flush(self) -> None:
-        """Pass the written bytes to the operating system. Raises OSError."""
+        """Flush the file's buffer; an OSError names the file."""
         try:
             self._file.flush()
         except OSError as error:
             raise _with_file_name(error, self._file) from error
 
     def _write_bytes(self, data: bytes) -> None:
-        """Write to the file, and update the CRC and the offset; an OSError names the file."""
+        """Write bytes to the file, and update the CRC and the offset; an OSError names the file."""
         try:
             self._file.write(data)
         except OSError as error:
@@ -276,12 +274,12 @@ class ContainerWriter:
 
 
 def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
-    """Return a copy of an error while writing, such as of a full disk, with the name of the file."""
+    """Return a copy of a write error that names the file, because the error of a full disk, for example, names none."""
     return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
 def _record_bytes(record: McapRecord) -> bytes:
-    """Encode a record with its opcode and length."""
+    """Encode a record as bytes, with its opcode and length."""
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
@@ -396,6 +394,7 @@ def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> t
     """Encode n message records, each with a timestamp before a body of constant size.
 
     Return the bytes of all records, and the offset of each record, (n + 1,); the last offset is the end of the bytes.
+
     log_times: ns since 1970, (n,).
     tag: protobuf tag of the timestamp.
     bodies: bytes of the messages after their timestamps, (n, size).
@@ -454,9 +453,9 @@ def _merge_by_time(
 
     Return all messages, (n,) of `ENTRY`, and the index of each chunk's first message, followed by n.  At equal times, a
     row comes last.
+
     row_times: log times of the rows, ns.
     row_length, row_channel: size in bytes and channel of each row's message.
-
     other_messages: messages in order of time, (m,) of `ENTRY`.
     prefix_size: size of the bytes before the first message of the first chunk.
     limit: largest size of a chunk of several messages, bytes.
@@ -525,6 +524,7 @@ def _index_messages(
     """Encode a message index record for each chunk and each channel with messages in it.
 
     Return the bytes of these records, and the arrays `chunks` and `channels` of `Layout`.
+
     entries: messages, (n,) of `ENTRY`.
     firsts: index of each chunk's first message, followed by n.
     prefix_size: size of the bytes before the first message.
@@ -567,9 +567,10 @@ def _index_messages(
 def lay_out_chunks(
     rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], prefix: bytes, limit: int
 ) -> Layout:
-    """Order message records by time, and index them in chunks of at most one second and `limit` bytes.
+    """Order message records by time, divide them into chunks of at most one second and `limit` bytes, and index them.
 
     A message of more than `limit` bytes gets a chunk of its own.  At equal times, a row comes after other messages.
+
     rows: message records of the rows, (n, size) bytes.
     row_times: log times of the rows, ns, (n,).
     row_channel: channel of the rows.
@@ -601,11 +602,13 @@ def lay_out_chunks(
 
 @compiled
 def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
-    """Check that the times of rows (s) increase, and return the log time of the last row, ns.
+    """Return the log time of the last of some rows, ns, or an error code if the times are invalid.
 
-    Return `OUT_OF_RANGE` if a time is not in 0..max_time.  Return `NOT_INCREASING` if a time is not later than the
-    previous one.
-    newest: log time before the first row, ns.
+    Return `OUT_OF_RANGE` if a time is negative or not below `max_time` (s), and `NOT_INCREASING` if a time is not later
+    than the previous one.
+
+    times: times of the rows, s, (n,).
+    newest: log time of the row before the first, ns.
     epoch: log time at simulation time 0, ns.
     """
     for k in range(len(times)):

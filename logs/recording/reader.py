@@ -1,4 +1,4 @@
-"""Read a log, check it, and rebuild its flight from the log only.
+"""Read a flight log, check it, and rebuild the flight from the log alone.
 
 A recorded verdict is returned unchanged, for comparison; no code relies on it.
 """
@@ -22,7 +22,7 @@ from flight.simulation.track import MAX_TIME_S, Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.foxglove_scene import LOG_LEVELS
 from logs.recording.foxglove_updates import EVENT_SOURCE as FLIGHT_EVENT_SOURCE
-from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
+from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, chunk_records, read_chunks, record_stream
 from logs.recording.mcap_writer import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.setup_attachments import (
     RECOVERY_FILE,
@@ -60,7 +60,7 @@ from world.wording import count_text
 
 @dataclass(frozen=True, slots=True)
 class LogChannel:
-    """Topic of a log, with the encoding of its messages and their schema.
+    """Channel of a log: its topic, and the encoding and the schema of its messages.
 
     schema: name of the schema.
     """
@@ -85,7 +85,9 @@ class LogMessage:
 
 
 def log_messages(path: Path) -> Iterator[LogMessage]:
-    """Yield the messages of a log in the order of the file, up to its first damage. Raises OSError.
+    """Yield the messages of a log in the order of the file, up to its first damage.
+
+    Raises OSError for a file that cannot be read.
 
     >>> import tempfile
     >>> from collections import Counter
@@ -108,9 +110,10 @@ def log_messages(path: Path) -> Iterator[LogMessage]:
 
 
 def log_channels(path: Path) -> list[LogChannel]:
-    """List the channels that the first chunk of a log declares.
+    """Return the channels that the first chunk of a log declares.
 
-    These are all channels of a log from `logs.recording.recorder.Recorder`.  Raises OSError.
+    A log from `logs.recording.recorder.Recorder` may have one more channel, for the returns drawn at its end.  Raises
+    OSError for a file that cannot be read.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -130,8 +133,12 @@ def log_channels(path: Path) -> list[LogChannel]:
 
 
 def _parse_messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
-    """Yield the messages of one chunk, and add the schemas and channels that it declares."""
-    for opcode, _, content in records(data):
+    """Yield the messages of one chunk, and add the schemas and channels that it declares to the two dictionaries.
+
+    data: records of the chunk.
+    schemas, channels: schemas and channels of earlier chunks, by number.
+    """
+    for opcode, _, content in chunk_records(data):
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(record_stream(content))
             schemas[schema.id] = schema
@@ -177,7 +184,7 @@ class FlightLog:
 
     source: name of the file, for messages.
     setup, track, events: the flown setup, the rows, and the events in order of time.
-    ended: reason for the end of the flight; None if the recording stopped before.
+    ended: reason for the end of the flight; None if the log does not state it.
     recorded_verdict: the verdict as written, or None; for comparison only.
     versions: versions of the packages of the flight.
     complete: True if nothing is missing or damaged.
@@ -363,9 +370,11 @@ def read_log(path: Path | str) -> FlightLog:
 
 
 def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords, str]:
-    """Return the rows before the first invalid row, and the fault of that row.
+    """Return the rows before the first invalid row, and a text on what is wrong with that row.
 
-    The fault is "" if all rows are valid.
+    The text is "" if all rows are valid.
+
+    waypoint_count: number of the route's waypoints, which the legs of the rows must not exceed.
     """
     state = rows["state"]
     time = state["time_s"]
@@ -385,9 +394,9 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return the reason for the flight's end (None if unknown), and the fault of the result or "".
+    """Return the reason for the flight's end (None if unknown), and a text on what is wrong with the result, or "".
 
-    row_count: number of rows in the log; the result has a fault if it states another number.
+    row_count: number of rows in the log, which the result must state, too.
     """
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"

@@ -1,7 +1,8 @@
 """Record one flight to one MCAP file while it is flown.
 
-The same setup and rows give the same bytes, however the rows are split into blocks: log_time is simulation time (see
-`logs.recording.state_channel.EPOCH_NS`), a chunk ends at 64 KiB or at a whole second, and nothing reads a clock.
+The same setup and rows give the same bytes, regardless of the blocks in which the rows are written: log_time is
+simulation time (see `logs.recording.state_channel.EPOCH_NS`), a chunk ends at 64 KiB or at a whole second, and no clock
+is read.
 """
 
 import contextlib
@@ -24,7 +25,7 @@ from flight.simulation.track import COLUMNS, MAX_TIME_S, TRACK_ROW, Rows, Track,
 from logs.recording import foxglove_scene as scene
 from logs.recording import foxglove_updates as clouds
 from logs.recording.foxglove_scene import aircraft_scene
-from logs.recording.foxglove_updates import FIX_TOPIC, TF_TOPIC, TRACK_POINTS, TRACK_TOPIC, FlightEvents, Poses
+from logs.recording.foxglove_updates import FIX_TOPIC, TF_TOPIC, TRACK_POINTS, TRACK_TOPIC, FlightEvents, ViewerMessages
 from logs.recording.mcap_writer import (
     CHUNK,
     NOT_INCREASING,
@@ -88,11 +89,10 @@ INTERRUPTED = "interrupted"
 
 
 class Recorder:
-    """Writer of a flight log; as a context manager, it leaves a readable file if the flight raises.
+    """Writer of a flight log; as a context manager, it leaves a readable file if the flight raises an error.
 
-    The setup is written first; then each whole second of flight is passed to the operating system, so that a killed
-    process loses at most the last second.  The log is locked against other processes, and a signal waits until a call
-    has ended.
+    The setup is written first; then each whole second of flight is written and flushed, so that a killed process loses
+    at most the last second.  The log is locked against other processes, and a signal is delayed until a call has ended.
 
     The log of an interrupted flight ends with the last flown row and has no verdict; `planfly check` can judge it.  A
     log without rows is removed.  After any other error, the log stays unfinished, and `planfly recover` can read its
@@ -149,7 +149,7 @@ class Recorder:
         # Do not remove a symbolic link, even if its target does not exist.
         file_existed = path.exists() or path.is_symlink()
         try:
-            with self._complete_write():
+            with self._uninterrupted_write():
                 path.touch()
                 # Take the lock before the file is emptied, so that a log locked by another process is not changed.
                 self._locks.enter_context(lock_path(path))
@@ -183,13 +183,13 @@ class Recorder:
                 self.abandon()
 
     def abandon(self) -> None:
-        """Close the file after an error, without a result, and ignore errors while closing."""
+        """Close the file after an error, without a result, and ignore an OSError while closing."""
         if self._is_open:
             with contextlib.suppress(OSError):
                 self._close_file()
 
     @contextlib.contextmanager
-    def _complete_write(self) -> Iterator[None]:
+    def _uninterrupted_write(self) -> Iterator[None]:
         """Delay signals until the end of the block, and name the file in its errors.
 
         The OSError of a full disk, for example, names no file.
@@ -203,17 +203,17 @@ class Recorder:
             raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def write(self, block: Track) -> None:
-        """Append rows; raise ValueError unless their times increase across all blocks and are at least 0 s."""
+        """Record a block of a track's rows, as `write_rows` does."""
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Rows) -> None:
-        """Record the rows of a flight, (t,) of `flight.simulation.track.TRACK_ROW`.
+        """Record the next rows of a flight, (t,) of `flight.simulation.track.TRACK_ROW`.
 
-        Raises ValueError unless their times increase across all calls and are at least 0 s.
+        Raises ValueError unless the times increase across all calls and are in the range from 0 s to `MAX_TIME_S`.
         """
         if not len(rows):
             return
-        with self._complete_write():
+        with self._uninterrupted_write():
             times = np.ascontiguousarray(rows["time"])
             newest = last_log_time(times, self._newest_ns, EPOCH_NS, MAX_TIME_S)
             if newest == OUT_OF_RANGE:
@@ -229,7 +229,7 @@ class Recorder:
                 self._append_rows(recorded_rows)
 
     def _append_rows(self, rows: Rows) -> None:
-        """Queue rows, and write the complete seconds of the queue whenever a batch is full."""
+        """Queue rows, and write the complete seconds in the queue whenever they fill a batch."""
         self._pending_rows.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
@@ -241,16 +241,17 @@ class Recorder:
         return self._file.tell()
 
     def flush(self) -> None:
-        """Pass all received rows to the operating system now.
+        """Write all queued rows and flush the file.
 
-        In a live flight, a killed process then loses less than a second. Chunks end at each flush, so the bytes of the
-        file (not its rows) depend on the times of the calls.
+        In a live flight, a killed process then loses less than a second. A chunk ends at each flush, so the bytes of
+        the file (not its rows) depend on the times of the calls.
         """
         self._write_pending(self._last_ns + 1)
 
     def event(self, time: float, text: str, level: str = "info") -> None:
-        """Record an event at a time (s).  Raises ValueError for an unknown level and a time out of range.
+        """Queue an event for the log; raise ValueError for an unknown level or a time out of range.
 
+        time: flight time, s.
         level: debug, info, warning, error or fatal.
         """
         if level not in scene.LOG_LEVELS:
@@ -268,14 +269,18 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write the end of the flight, the verdict, reference flights and returns, and close the file."""
-        with self._complete_write():
+        """Write the rest of the flight and its results, and close the file.
+
+        end_reason: "completed", or the reason why the flight ended early.
+        verdict, reference, returns: verdict, results of reference flights, and returns to draw; None to omit them.
+        """
+        with self._uninterrupted_write():
             if self._skipped_row is not None:
                 self._append_rows(self._skipped_row)
                 self._skipped_row = None
             self._write_pending(None)
             end = max(self._last_ns, EPOCH_NS)
-            self._write_messages([*self._poses.whole_track_records(end)])
+            self._write_messages([*self._viewer_messages.whole_track_records(end)])
             if returns is not None:
                 # With the log time of the start, viewers show the scene during the whole flight.
                 update = scene.returns_scene(EPOCH_NS, returns, self._terrain)
@@ -295,7 +300,7 @@ class Recorder:
             self._close_file()
 
     def _open_file(self, setup: FlightSetup) -> None:
-        """Open the file, replacing it, and write the setup: its attachments, all channels, and its static scenes."""
+        """Open the file, replacing an existing one, and write the setup: attachments, channels and static scenes."""
         attachments = pack_setup(setup)
         self._file = self._path.open("wb", buffering=_BUFFER_BYTES)
         try:
@@ -329,7 +334,7 @@ class Recorder:
         except OSError:
             self._file.close()
             raise
-        self._poses = Poses(setup.scenario.origin, self._channels)
+        self._viewer_messages = ViewerMessages(setup.scenario.origin, self._channels)
         self._flight_events = FlightEvents(setup, self._channels[EVENT_TOPIC])
         self._is_open = True
 
@@ -340,7 +345,7 @@ class Recorder:
         return self._channels[topic]
 
     def _close_file(self) -> None:
-        """Write pending rows and events, the summary and the end of the file, and release its lock."""
+        """Write pending rows and events and the file's summary, close the file, and release its lock."""
         self._is_open = False
         with self._locks, self._file:
             self._write_pending(None)
@@ -351,9 +356,9 @@ class Recorder:
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
-        """Write the pending rows and events before log time `end_ns`, in chunks of at most one second.
+        """Write the pending rows and events before a log time in chunks of at most one second, and flush the file.
 
-        end_ns: ns; None to write all.
+        end_ns: log time, ns; None to write all.
         """
         rows = join_rows(self._pending_rows)
         log_times = times_ns(rows["time"])
@@ -362,7 +367,7 @@ class Recorder:
         events = [event for event in self._events if end_ns is None or event.log_times[0] < end_ns]
         self._events = [event for event in self._events if end_ns is not None and event.log_times[0] >= end_ns]
         rows, log_times = rows[:end_row], log_times[:end_row]
-        pose_records = self._poses.pose_records(log_times, rows["position"], rows["attitude"])
+        pose_records = self._viewer_messages.pose_records(log_times, rows["position"], rows["attitude"])
         event_records = self._flight_events.event_records(log_times, rows["position"], rows["leg"])
         self._write_messages([*pose_records, *event_records, *events], rows, log_times)
         self._writer.flush()
@@ -370,8 +375,9 @@ class Recorder:
     def _write_messages(
         self, other_messages: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES
     ) -> None:
-        """Write rows and other messages in order of time; at equal times, a row comes after other messages.
+        """Write rows and other messages in chunks, in order of time; at equal times, a row comes after other messages.
 
+        other_messages: message records of other channels than the rows' channel.
         log_times: log time of each row, ns, (t,).
         """
         channel = self._channels[STATE_TOPIC]
@@ -402,9 +408,9 @@ class Recorder:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return the rows that a `Recorder` with this stride records: every n-th row, and the last row.
+    """Return the rows of a track that a `Recorder` with a stride records: every n-th row, and the last row.
 
-    every: stride n; the whole track for 1 or less.
+    every: stride n; with 1 or less, the track is returned unchanged.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

@@ -1,4 +1,4 @@
-"""Recover the readable part of an unfinished or damaged log, as a file that any MCAP reader opens.
+"""Recover the readable part of an unfinished or damaged log as a new log that any MCAP reader opens.
 
 The new log contains a note on the loss, so that it is always read as incomplete.
 """
@@ -30,10 +30,10 @@ class RecoveredLog:
 
 
 def recover_log(path: Path) -> RecoveredLog | None:
-    """Rebuild a log up to its first damage; return None for a complete log.
+    """Build a new log from the part of a log before its first damage; return None for a complete log.
 
-    Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are omitted,
-    because they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
+    Chunks and attachments before the damage are copied.  The result of the flight and the verdict are omitted, because
+    they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log

@@ -79,7 +79,7 @@ def heights_name(part: int) -> str:
 
 
 def media_type(name: str) -> str:
-    """Return the media type that belongs to the suffix of an attachment's name."""
+    """Return the media type of an attachment by the suffix of its name."""
     return _MEDIA_TYPES[PurePath(name).suffix]
 
 
@@ -114,7 +114,7 @@ class _TerrainFile(SetupModel):
 
 
 def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
-    """Encode the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights in parts."""
+    """Encode the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights without loss, in parts."""
     rows, cols = terrain.heights.shape
     parts = {}
     compressor = zstandard.ZstdCompressor(level=3)
@@ -143,9 +143,9 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
 def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     """Rebuild the terrain from its attachments, bit for bit.
 
-    Raises LogError for heights that are missing, damaged or of wrong size, and for an invalid map.
+    Raises LogError for heights that are missing, damaged or of wrong size, and for an invalid map to pixels.
 
-    attachments: attachments from `pack_terrain`, among others.
+    attachments: attachments of the log, bytes by name, which include those from `pack_terrain`.
     source: name of the log for messages.
     """
     try:
@@ -196,7 +196,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    """Divide the rows of the terrain among attachments; return (first row, row after the last) of each."""
+    """Divide the rows of the terrain's heights among attachments; return first row and row after the last of each."""
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
@@ -253,7 +253,7 @@ class _ForecastFile(SetupModel):
 
 
 def pack_forecast(wind: Wind) -> dict[str, bytes]:
-    """Encode the weather forecast of a wind as attachments, bytes by name; {} for a wind without forecast."""
+    """Encode the weather forecast of a wind as attachments, bytes by name; {} for a wind without a forecast."""
     if wind.forecast is None:
         return {}
     numbers = np.empty(0) if wind.field is None else wind.field.packed()
@@ -265,10 +265,12 @@ def pack_forecast(wind: Wind) -> dict[str, bytes]:
 
 
 def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind, *, is_in_forecast: bool) -> Wind:
-    """Add the forecast in the attachments to a wind; return the wind unchanged without a forecast.
+    """Return the wind with the forecast that a log's attachments contain; unchanged if they contain none.
 
-    is_in_forecast: True if the scenario names a forecast, so that the attachments must contain it.
     Raises LogError for an attachment that is missing or has the wrong content.
+
+    source: name of the log for messages.
+    is_in_forecast: True if the scenario names a forecast, so that the attachments must contain it.
     """
     if FORECAST_FILE not in attachments:
         if is_in_forecast:
@@ -348,7 +350,7 @@ def package_versions() -> dict[str, str]:
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
-    """Encode a setup as the attachments that a log needs, bytes by name, `SETUP_FILE` first.
+    """Encode a setup as attachments for a log, bytes by name, `SETUP_FILE` first.
 
     The same setup and packages give the same bytes.
     """
@@ -470,7 +472,7 @@ def _json_bytes(data: Any) -> bytes:
 
 
 def _finite_or_text(data: Any) -> Any:
-    """Return the data with non-finite numbers as strings, because JSON has no such numbers."""
+    """Return a copy of nested data in which strings replace non-finite numbers, because JSON has no such numbers."""
     if isinstance(data, float) and not math.isfinite(data):
         return str(float(data))
     if isinstance(data, dict):
@@ -481,9 +483,12 @@ def _finite_or_text(data: Any) -> Any:
 
 
 def _read_json(attachments: dict[str, bytes], name: str, source: str, terrain: Terrain | None) -> tuple[str, Any]:
-    """Return the text and the value of the attachment of the scenario or the plan.
+    """Return the text and the parsed value of the scenario's or the plan's attachment.
 
     Raises LogError if it is missing, not JSON, or needs terrain although the log has none.
+
+    source: name of the log for messages.
+    terrain: the log's terrain; None if it has none.
     """
     file_name = f"{source}: {name}"
     try:

@@ -1,4 +1,4 @@
-"""The tables of `setup.json`: mission, route, envelope and parameters of a `FlightSetup`.
+"""Define the tables of `setup.json`: mission, route, envelope and parameters of a `FlightSetup`.
 
 A table has the fields of its dataclass under keys with units.  pydantic writes it from the attributes of the dataclass,
 and the dataclass is made from its values.  Numbers are written as Python's repr, which reads back to the same float.
@@ -58,8 +58,8 @@ class SetupModel(BaseModel):
         """Make a table from an object of the dataclass that it stores."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
-    def fault(self, file: str, field: str, message: str) -> LogError:
-        """Return the error for a field; the message names the field by its key in the file.
+    def field_error(self, file: str, field: str, message: str) -> LogError:
+        """Return the error for an invalid field, whose message names the field by its key in the file.
 
         file: name of the log for the message.
         field: name of the field in the dataclass.
@@ -69,7 +69,10 @@ class SetupModel(BaseModel):
 
 
 def _make_from_table(data_class: type[Data], table: SetupModel, **replacements: Any) -> Data:
-    """Make a dataclass from the values of a table; `replacements` replace fields of the table."""
+    """Make an object of a dataclass from the values of a table.
+
+    replacements: values by field name that replace those of the table.
+    """
     return data_class(**(dict(table) | replacements))
 
 
@@ -181,10 +184,12 @@ class RouteTable(SetupModel):
     def route(self, file: str) -> Route:
         """Return the route of the table.
 
-        Raises LogError for inconsistent columns, and for a leg without length.
+        Raises LogError for inconsistent columns, and for a leg without horizontal length.
+
+        file: name of the log for the message.
         """
         if not (leg_runs(np.array(self.position)) > 0.0).all():
-            raise self.fault(file, "position", "a leg without horizontal length")
+            raise self.field_error(file, "position", "a leg without horizontal length")
         columns, count = {}, len(self.position)
         for name in field_names(ROUTE_POINT):
             values, expected = getattr(self, name), count - (name == "airspeed")
@@ -192,14 +197,14 @@ class RouteTable(SetupModel):
             if not values and not type(self).model_fields[name].is_required():
                 continue
             if len(values) != expected:
-                raise self.fault(file, name, f"{len(values)} values: expected {expected}")
+                raise self.field_error(file, name, f"{len(values)} values: expected {expected}")
             columns[name] = [NOT_STATED if value is None else value for value in values]
         start = self.rtl_start
         if (start is None) != (self.rtl_loiter is None) or (start is not None and start >= count - 1):
             text = f"{_NO_NUMBER if start is None else start}: expected a waypoint before the last, and a target"
-            raise self.fault(file, "rtl_start", text)
+            raise self.field_error(file, "rtl_start", text)
         if self.direct_landing_start is not None and self.direct_landing_start >= count:
-            raise self.fault(
+            raise self.field_error(
                 file, "direct_landing_start", f"{self.direct_landing_start}: expected a waypoint, or {_NO_NUMBER}"
             )
         other_fields = {name: value for name, value in self if name not in field_names(ROUTE_POINT)}
@@ -238,11 +243,13 @@ class EnvelopeTable(SetupModel):
     def envelope(self, file: str) -> Envelope:
         """Return the envelope of the table.
 
-        Raises LogError for inconsistent tables, and for axes out of order.
+        Raises LogError for tables of inconsistent shape, and for an axis that does not increase.
+
+        file: name of the log for the message.
         """
         for field in ("airspeed", "amsl"):
             if (np.diff(getattr(self, field)) <= 0.0).any():
-                raise self.fault(file, field, "not increasing")
+                raise self.field_error(file, field, "not increasing")
         speeds, heights = len(self.airspeed), len(self.amsl)
         shapes = {field: [speeds, heights] for field in ("climb", "descent")}
         shapes |= {field: [heights] for field in ("level_speed_min", "level_speed_max")}
@@ -254,7 +261,7 @@ class EnvelopeTable(SetupModel):
             values = getattr(self, field)
             found_shape = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
             if found_shape != shape:
-                raise self.fault(file, field, f"shape {found_shape}: expected {shape}")
+                raise self.field_error(file, field, f"shape {found_shape}: expected {shape}")
         return _make_from_table(Envelope, self, **empty_powers)
 
 
@@ -278,7 +285,7 @@ def parameters_table(parameters: StoredParameters) -> ParametersTable:
 
 
 def read_parameters(table: ParametersTable) -> StoredParameters:
-    """Read the parameters of an autopilot from a table; the autopilot checks them."""
+    """Return the parameters of an autopilot from a table, without a check; the autopilot checks them."""
     values = (ParameterValue(name, value, table.origins.get(name, "default")) for name, value in table.values.items())
     return StoredParameters(tuple(values), table.unused, table.source)
 

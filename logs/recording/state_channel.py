@@ -1,4 +1,4 @@
-"""The `/state` channel: rows of the track as protobuf messages, their schema, and their bytes as numpy arrays.
+"""Encode and decode the `/state` channel: rows of the track as protobuf messages, by numpy arrays of their bytes.
 
 Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
 messages are one structured array. Any protobuf parser reads them. The schema is built here, so that no protoc is
@@ -39,7 +39,7 @@ _LENGTH_DELIMITED = 2
 
 
 def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the numpy fields of doubles, each after a one-byte field `tag_<name>` for its protobuf tag."""
+    """Return numpy fields for named doubles, each with a one-byte field `tag_<name>` before it for its protobuf tag."""
     return [field for name in names for field in ((f"tag_{name}", "u1"), (name, "<f8"))]
 
 
@@ -49,20 +49,22 @@ def submessage_dtype(names: Sequence[str]) -> np.dtype[np.void]:
 
 
 def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
-    """Fill the n records of `out` with m doubles each, every double after its protobuf tag.
+    """Fill n records with m doubles each, every double after its protobuf tag.
 
+    out: records to fill, (n,), with the fields of `tagged_doubles`.
+    names: names of the m fields, whose protobuf field numbers are 1 to m.
     values: doubles of each record, (n, m).
-    names: names of the m fields, which have the numbers 1 to m.
     """
     for field_number, (name, column) in enumerate(zip(names, values.T, strict=True), 1):
         out[f"tag_{name}"], out[name] = field_number << 3 | _FIXED64, column
 
 
 def fill_submessages(out: Encoded, field_number: int, names: Sequence[str], values: Floats) -> None:
-    """Write a submessage of doubles into `out` for each row of values (n, m).
+    """Fill n records with a submessage of m doubles each.
 
-    out: (n,) of type `submessage_dtype`.
+    out: records to fill, (n,) of type `submessage_dtype`.
     field_number: field number of the submessage in its parent message.
+    names, values: as in `fill_doubles`.
     """
     out["tag"], out["size"] = field_number << 3 | _LENGTH_DELIMITED, out.dtype.itemsize - 2
     fill_doubles(out, names, values)
@@ -110,7 +112,7 @@ _KINDS = {
 
 
 class StateField(NamedTuple):
-    """A field of the message.
+    """Field of the state message.
 
     name: name with its unit.
     kind: numpy type.
@@ -196,7 +198,7 @@ def state_schema() -> bytes:
 
 
 def file_descriptor_set(descriptor: "Descriptor") -> bytes:
-    """Return the serialized FileDescriptorSet of a message; each file comes after its imports."""
+    """Return the serialized FileDescriptorSet of a message type; each file comes after the files that it imports."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: "FileDescriptor") -> None:
@@ -214,7 +216,7 @@ def file_descriptor_set(descriptor: "Descriptor") -> bytes:
 
 
 def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the log_time of each simulation time (s): ns since 1970; time 0 is `EPOCH_NS`."""
+    """Convert simulation times, s, to log times, ns since 1970; time 0 becomes `EPOCH_NS`."""
     return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
@@ -270,6 +272,8 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
     """Parse one state message in any layout that protobuf allows; return it as (1,) of `RECORD`.
 
     Raises google.protobuf.message.DecodeError for an invalid message.
+
+    parser: class from `state_class`.
     """
     message = parser.FromString(data)
     record = _TEMPLATE.copy()
@@ -280,7 +284,7 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
 
 @compiled
 def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """Count the leading records that have the expected bytes.
+    """Return the number of leading records that have the expected bytes.
 
     raw: bytes of the records, (n, size).
     columns: positions of the compared bytes in a record, (k,).
@@ -311,7 +315,7 @@ class RowMatcher:
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
-        """Return the records from byte `offset` on that have the expected layout, (n,) of `RECORD`."""
+        """Return the consecutive records from byte `offset` on that have the expected layout, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
         matching_count = _count_matching(raw, self._columns, self._expected)

@@ -91,7 +91,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
     east, north = scenario.wind_velocity(scenario.start.tolist())
     has_field = wind.field is not None
     gradient = 0.0 if has_field else wind.gradient
-    # The file that decided the autopilot, if it was neither named nor the default.
+    # If the user named no autopilot and it is not the default, say from which file it was taken.
     source_text = (
         ""
         if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT
@@ -129,7 +129,10 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
 
 
 def judging_conditions(setup: FlightSetup) -> Conditions:
-    """Return the conditions under which a mission or a flight is judged, from its setup."""
+    """Return the conditions under which a mission or a flight is judged, from its setup.
+
+    For an imported flight, turbulence and navigation are None, and so is the mass of an unknown aircraft.
+    """
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
     imported_log = setup.imported_log
@@ -201,23 +204,24 @@ def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
     return f"{'Flown by' if is_flown else 'Autopilot'}: {conditions.autopilot}"
 
 
-def flown_lines(conditions: Conditions) -> list[str]:
-    """Return the lines on a flight's aircraft, its conditions and the autopilot that flew."""
+def flown_condition_lines(conditions: Conditions) -> list[str]:
+    """Return three lines on a flight: its aircraft and airspeed, its weather and world, and its autopilot."""
     return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
 
 
-# Largest angle between the lines of two legs that lie side by side.
+# Legs whose lines cross at no more than this angle can lie side by side.
 _PARALLEL_ANGLE_RAD = math.radians(15.0)
 # Legs closer to each other than this are the same line, m.
 _SAME_LINE_DISTANCE_M = 1.0
 
 
 def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
-    """Return a line on a corridor whose width the scenario does not state; "" if the scenario states it.
+    """Return a line on the corridor's width and where it comes from; "" if the scenario states the width.
 
-    The line states the corridor's width, its source, and how many legs have a wider corridor because of turns or
-    loiters.  It warns if the corridor is wider than the distance between legs, because a flight within it may never
-    have followed the legs.  The line is "" for surveys, whose photo lines are judged one by one.
+    The line also counts the legs that have a wider corridor because of turns or loiters.  It warns if the corridor is
+    wider than the distance between legs, because a flight within it may never have followed the legs.  The line is ""
+    for surveys, too, because their photo lines are judged one by one.
+
     findings: findings of the verdict, which contain the corridor of each leg.
     """
     half_width, radius = setup.corridor, setup.autopilot.turns.acceptance_radius or 0.0
@@ -251,12 +255,13 @@ def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
 
 
 def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the smallest distance between side-by-side legs k and k + 2 (m), and the number k.
+    """Return the smallest distance between two side-by-side legs k and k + 2, m, and the number k.
 
-    Their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`, and at least half of the shorter leg lies next
-    to the longer leg.  Return None if there are no such legs.
+    Legs lie side by side if their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`, and at least half of
+    the shorter leg lies next to the longer one.  Legs on the same line (`_SAME_LINE_DISTANCE_M`) are left out.  Return
+    None if there are no such legs.
 
-    waypoints: east, north and up, m, (w, 3).
+    waypoints: positions of the route's waypoints, east, north and up, m, (w, 3).
 
     >>> lines = np.array([[0, 0, 0], [0, 900, 0], [40, 900, 0], [40, 0, 0]], dtype=float)
     >>> min_leg_spacing(lines)

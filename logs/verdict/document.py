@@ -140,13 +140,16 @@ def level_document(level: LevelAnswer) -> LevelDocument:
 
 
 def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
-    """Return the parameter that decides if the flight passes as a document, including its text."""
+    """Return the deciding parameter as a document, including the sentence that describes it."""
     data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
     return DecidingDocument(**data, text=deciding_text(deciding))
 
 
 def parameters_document(parameters: Parameters) -> ParametersDocument:
-    """Return the parameters as a document: values, origins, and entries of the file without an effect."""
+    """Return the autopilot's parameters as a document.
+
+    It lists values with their origins, names in the file that have no effect, and names that are not simulated.
+    """
     return ParametersDocument(
         file=parameters.source,
         values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),

@@ -36,12 +36,12 @@ UNKNOWN_PATH = "unknown way"
 GROUND_PATH = "ground way"
 # An item that changes the flight path is not flown as the autopilot would fly it, or parameters contradict one another.
 NOT_FLOWN = "not flown"
-# Returns or glides that a scenario requires are not known well enough.
+# Simulated returns to launch or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
-# The crab angle reduces the common area of photos side by side below the required overlap.
+# The side overlap is sufficient, but the crab angles reduce the common area of the photos below what is required.
 UNKNOWN_OVERLAP = "unknown overlap"
-# Without a home, the destination of the return after the last item is unknown.  The verdict may still be "flyable", as
-# without elevation data.
+# The return to launch after the last item has no destination, because the mission has no home.  The verdict may still
+# be "flyable", as without elevation data.
 NO_HOME = "no home"
 # Checks that a flight cannot decide.  A flight may pass although they are undecided.
 APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN, UNKNOWN_OVERLAP)
@@ -106,7 +106,7 @@ class Finding:
 
     @property
     def state(self) -> State:
-        """State of the finding.
+        """State of the finding, as shown by signs and colors: "ok", "fail", "open" or "unjudged" (see `State`).
 
         >>> make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT).state
         'open'
@@ -152,9 +152,9 @@ class Finding:
 
     @property
     def nearest_distance(self) -> float | None:
-        """Distance from the nearest kill zone or airspace zone, m, negative inside it; None if unknown.
+        """Distance from the nearest kill zone or airspace zone, m, negative inside it, or None.
 
-        Only findings of the rules `threat` and `fence` have this fact.
+        It is the fact "nearest", which only findings of the rules `threat` and `fence` may have.
         """
         return next((fact.value for fact in self.facts if fact.what == "nearest"), None)
 
@@ -165,17 +165,20 @@ class Finding:
         >>> make_finding("stall", Place("flight"), ok=True, reason="", limit=9.5, unit="m/s", at_least=True).limit_text
         '≥ 9.5 m/s'
         """
-        return self._texts_with(self.effective_limit)[1]
+        return self._value_and_limit_texts(self.effective_limit)[1]
 
     def compared_texts(self) -> tuple[str, str]:
         """Return the value and the range of passing values as texts, with enough digits to tell the two apart.
 
         The range includes the tolerance, unless `tolerance_note` states it.
         """
-        return self._texts_with(self.shown_limit)
+        return self._value_and_limit_texts(self.shown_limit)
 
-    def _texts_with(self, limit: float | None) -> tuple[str, str]:
-        """Return the value and the values within a limit as texts, with enough digits to tell the two apart."""
+    def _value_and_limit_texts(self, limit: float | None) -> tuple[str, str]:
+        """Return the value and the passing range ("≤ limit" or "≥ limit") as texts; "" for a missing number.
+
+        Both have enough digits to tell value and limit apart.
+        """
         value = self.value
         if value is None or limit is None:
             texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
@@ -216,7 +219,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """Message of a rule.
+    """Statement of a rule, from which the reason of a finding is made.
 
     text: full text.
     brief: first part of the text, for a headline.
@@ -229,8 +232,9 @@ class Message:
 
 
 def message(brief: str, explanation: str = "", *, placed: bool = False) -> Message:
-    """Make a message from a brief statement and an explanation, which begins with its punctuation.
+    """Make a message from a brief statement and an explanation.
 
+    explanation: appended as it is, so it begins with its own punctuation or space.
     placed: True if the message begins with the finding's place.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
@@ -291,12 +295,12 @@ def make_finding(
 ) -> Finding:
     """Make a finding with numbers rounded to 1e-6; non-finite numbers become None.
 
-    faults: faults with which the reason begins.
+    reason: the whole reason, which begins with the faults.
+    faults: messages on what failed; the first one gives the brief reason, which is `reason` without faults.
     facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
 
-    The margin is dropped if it contradicts `ok`, because the finding then fails or passes for another reason than its
-    number.
+    The margin is dropped if it contradicts `ok`: something other than the number then decided the outcome.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True
@@ -334,7 +338,7 @@ def _rounded_or_none(value: float | None) -> float | None:
 
 
 def worst_first_key(finding: Finding) -> tuple[int, float]:
-    """Return a sort key that puts the worst finding first: failed, unjudged, passed; each by margin.
+    """Return a sort key that puts failed findings first, then unjudged, then passed, each by increasing margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> worst_first_key(near) < worst_first_key(far)
@@ -345,7 +349,9 @@ def worst_first_key(finding: Finding) -> tuple[int, float]:
 
 
 def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Return a finding's reason: its faults and then its facts as details, or only its facts without a fault.
+    """Join faults and details into the reason of a finding; without faults, the reason is the details alone.
+
+    facts: texts on measured values, such as "radius 76 m".
 
     >>> finding_reason([message("overshoots its arc by 8 m")], ["turns 62.0°", "radius 76 m"])
     'overshoots its arc by 8 m. Details: turns 62.0°; radius 76 m'

@@ -36,16 +36,16 @@ def event_phrase(noun: str, finding: Finding) -> str:
 
 
 def return_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase with the brief reason of a failed return, and its place unless that is a waypoint."""
+    """Return a phrase for a failed return to launch: `reason_phrase`, or only the brief reason at a waypoint."""
     if finding.place.kind == "waypoint":
         return shorten_statement(finding.brief)
     return reason_phrase(noun, finding)
 
 
 def shortfall_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)".
+    """Return a phrase for a value below its limit: "speed on leg 2 (11.9 m/s < 12 m/s)".
 
-    Without a value that is too low, the phrase contains the reason instead.
+    Return `reason_phrase` if no value is below the limit.
     """
     value, limit = finding.value, finding.effective_limit
     if value is None or limit is None or value >= limit:
@@ -54,11 +54,10 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)".
+    """Return a phrase for a value beyond its limit: "slope on leg 0 (14.5° > 14.2°)".
 
-    Without a value that exceeds the limit, the phrase contains the reason instead.
-    The value is the one that was compared with the limit.  Without a margin, it is the larger of the flown and the
-    planned value.
+    The value is the one that was compared with the limit.  Without a margin, it is the flown or the planned value,
+    whichever has the larger magnitude.  Return `reason_phrase` if its magnitude does not exceed the limit's.
     """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
     worst_value = max(values, key=abs, default=None) if finding.margin is None else finding.value
@@ -70,17 +69,14 @@ def excess_phrase(noun: str, finding: Finding) -> str:
 
 
 def slope_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase with the reason if the limit is 0°; otherwise return `excess_phrase`.
-
-    With a limit of 0°, the aircraft can fly no slope.
-    """
+    """Return `excess_phrase`, or `reason_phrase` for a limit of 0°, at which the aircraft can fly no slope."""
     return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
 
 
 def small_circle_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "loiter at waypoint 3 (radius 40 m < 76 m)".
+    """Return a phrase for a loiter that is too small: "loiter at waypoint 3 (radius 40 m < 76 m)".
 
-    Return `excess_phrase` instead if the planned radius is not below its limit.
+    Return `excess_phrase` if the planned radius is not below its limit.
     """
     limit = finding.effective_limit
     if finding.planned is None or limit is None or finding.planned >= limit:
@@ -89,9 +85,9 @@ def small_circle_phrase(noun: str, finding: Finding) -> str:
 
 
 def zone_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "town (exclusion) violated (12.0 m inside)".
+    """Return a phrase for a violated zone: "town (exclusion) violated (12.0 m inside)".
 
-    Return `excess_phrase` for a place without a name.  The depth is the flown one, or the planned one without a flight.
+    The depth is the flown one, or without a flight the planned one.  Return `excess_phrase` for a place without a name.
     """
     if not finding.place.name:
         return excess_phrase(noun, finding)
@@ -101,26 +97,26 @@ def zone_phrase(noun: str, finding: Finding) -> str:
 
 
 def missile_phrase(_noun: str, finding: Finding) -> str:
-    """Return a phrase such as "missile Alfa (13.3 s inside its range)"."""
+    """Return a phrase for time within a missile's range: "missile Alfa (13.3 s inside its range)"."""
     return f"missile {threat_text(finding.place)} ({_flown_or_planned(finding):.1f} s inside its range)"
 
 
 def _flown_or_planned(finding: Finding) -> float:
-    """Return a finding's flown value; its planned value if nothing was flown, and 0 without any."""
+    """Return a finding's flown value, or its planned value if nothing was flown, or 0 if both are missing."""
     value = finding.planned if finding.flown is None else finding.flown
     return value or 0.0
 
 
 def photo_line_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase that compares a photo line's usable fraction, or the overlap, with its minimum."""
+    """Return `shortfall_phrase` for a photo line's usable fraction, or for the overlap that `Finding.check` names."""
     return shortfall_phrase(finding.check or noun, finding)
 
 
 def missed_waypoint_phrase(_noun: str, finding: Finding) -> str:
-    """Return a phrase such as "waypoint 3 missed (120 m > 50 m)".
+    """Return a phrase for a missed waypoint: "waypoint 3 missed (120 m > 50 m)".
 
-    The distances are left out if the waypoint was never passed.  A brief reason other than the full reason replaces
-    "missed".
+    Without a distance beyond the limit, the phrase is only "waypoint 3 missed".  If a flown finding has a brief reason
+    that differs from its full reason, this reason replaces "missed" and the distances.
     """
     if finding.flown is not None and finding.brief != finding.reason:
         return f"{place_text(finding.place)} {finding.brief}"

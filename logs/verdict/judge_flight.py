@@ -103,9 +103,10 @@ def judge_flight(
 
 
 def with_reference(verdict: Verdict, requirements: RouteRequirements, reference: ReferenceFlights) -> Verdict:
-    """Add the airframe's answer and the suggestions that passed, from reference flights, to a verdict.
+    """Return a verdict with the results of its reference flights, and with its summary written again.
 
-    A verdict on a flight that never began is returned unchanged.
+    They are the airframe's answer, the suggestions that passed, and, unless the verdict is flyable, the deciding
+    parameter.  A verdict on a flight that never began is returned unchanged.
     """
     if verdict.level != "flown":
         return verdict
@@ -135,16 +136,16 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
 
 
 def _has_failed(findings: Sequence[Finding]) -> bool:
-    """Return True if a finding has failed."""
+    """Return True if any finding has failed."""
     return any(finding.ok is False for finding in findings)
 
 
 def _disagreements(
     level: str, level_findings: Sequence[Finding], flight_findings: Sequence[Finding]
 ) -> tuple[Disagreement, ...]:
-    """Return the findings that a level and the flight judge differently, in the level's order.
+    """Return the rules and places that a level and the flight judge differently, in the level's order.
 
-    A flown landing is judged by the rule of `FLOWN_COUNTERPARTS`.
+    A rule that judges no flight is compared with the rule that `FLOWN_COUNTERPARTS` names for it.
 
     level: name of the level.
     """
@@ -163,10 +164,10 @@ def _disagreements(
 
 
 def _worst_outcomes(findings: Sequence[Finding]) -> dict[tuple[object, ...], Finding]:
-    """Return the worst judged finding of each rule at each place, under a key that all levels share.
+    """Return the worst judged finding of each rule at each place, by a key that is the same at all levels.
 
-    The corners of one loiter share a key, and so do all photo lines for one kind of overlap, because levels may find
-    different ones to be the worst.
+    The corners of one loiter share a key, because levels may differ in which corner is the worst.  For the same reason
+    all front overlaps share a key, and all side overlaps.
     """
     outcomes: dict[tuple[object, ...], Finding] = {}
     for finding in findings:

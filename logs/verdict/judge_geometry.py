@@ -68,7 +68,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
 
 
 def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_complete: bool = True) -> Verdict:
-    """Judge a flight without rows by its route's geometry; the verdict is never complete.
+    """Judge a flight whose track has no rows by its route's geometry; the verdict is never complete.
 
     end_reason: reason why nothing was flown.
     log_complete: True if the log is not cut off.
@@ -177,7 +177,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
 
 
 def _infeasible_finding(plan: Plan) -> Finding:
-    """Return the failed finding on a plan that is not feasible, with the problems of its certificate."""
+    """Return a failed finding of the completion rule, whose reason lists the failures of an infeasible plan."""
     first_problem, *other_problems = plan.failures
     fault = message(
         f"no feasible plan was found: {first_problem}", "".join(f"; {problem}" for problem in other_problems)

@@ -37,7 +37,7 @@ class JunitSuite(NamedTuple):
 
 
 def suites_text(suites: Iterable[JunitSuite]) -> str:
-    """Return the text of a JUnit file."""
+    """Return test suites as the XML text of a JUnit file."""
     root = ElementTree.Element("testsuites")
     for suite in suites:
         counts = Counter(case.result for case in suite.cases)
@@ -101,7 +101,7 @@ def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...]
 
 
 def junit_error_text(name: str, message: str) -> str:
-    """Return the text of a JUnit file with one erroneous test case, for what could not be judged.
+    """Return the text of a JUnit file with one erroneous test case, for a plan or flight that could not be judged.
 
     name: name of the plan or flight.
     message: reason in one line.
@@ -110,9 +110,9 @@ def junit_error_text(name: str, message: str) -> str:
 
 
 def answer_case(reason: str) -> JunitCase:
-    """Make the test case of an answer.
+    """Make the test case named "verdict", which fails if a reason is given.
 
-    reason: reason why the answer fails; "" if it passes.
+    reason: reason for the failure; "" if the test case passes.
     """
     return JunitCase("planfly", "verdict", "failure" if reason else "passed", reason)
 

@@ -78,7 +78,9 @@ class Place(DocumentConfig):
 
 
 def numbered_place(place: Place) -> Place:
-    """Return a place whose index is its number in texts, so that all corners of a loiter are one place.
+    """Return a place with its number in texts as its index, so that all corners of a loiter are one place.
+
+    A place without a number is returned unchanged.
 
     >>> numbered_place(Place("waypoint", 11, item=4, number=3)).index
     3

@@ -40,7 +40,7 @@ _SHOWN_WORDS = tuple(
 
 
 def finding_words(finding: Finding) -> RuleWords:
-    """Return the texts with which a finding is shown: those of its rule, or of the overlap of photos."""
+    """Return the texts of a finding's rule, or the texts on photo overlap for an overlap of a survey."""
     is_overlap = finding.rule == _OVERLAP_WORDS.name and finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
     return _OVERLAP_WORDS if is_overlap else RULE_WORDS[finding.rule]
 
@@ -135,8 +135,11 @@ def number_texts(finding: Finding) -> NumberTexts:
     )
 
 
-def missed_text(finding: Finding) -> str:
-    """State by how much a failed finding misses its limit, with the unit; "" if the finding has no limit."""
+def limit_violation_text(finding: Finding) -> str:
+    """Return how far a failed finding is beyond its limit and tolerance, with the unit.
+
+    Return "" for a finding that did not fail, or that has no limit or no margin.
+    """
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
         return ""
     distance = -finding.margin - (finding.tolerance or 0.0)
@@ -145,7 +148,7 @@ def missed_text(finding: Finding) -> str:
 
 
 def method_text(finding: Finding) -> str:
-    """Return the method of a finding, with its limit and its tolerance."""
+    """Return the method of a finding, with its limit and its tolerance if it has both."""
     if not finding.tolerance or not finding.method or finding.limit is None:
         return finding.method
     limit, tolerance = (format_quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
@@ -158,7 +161,7 @@ def state_text(state: State) -> str:
 
 
 def count_sentence(findings: Sequence[Finding]) -> str:
-    """Return a sentence on the numbers of findings that pass, fail, and were not judged."""
+    """Return a sentence that states how many findings pass, how many fail, and how many were not judged."""
     counts = Counter(finding.state for finding in findings)
     passed_text = f"{counts['ok']} of {counts['ok'] + counts['fail']} judged findings pass"
     failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
@@ -184,7 +187,7 @@ class RuleFindings:
         )
 
     @property
-    def judged(self) -> int:
+    def judged_count(self) -> int:
         """Number of findings that were judged."""
         return sum(finding.ok is not None for finding in self.findings)
 
@@ -196,7 +199,7 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """Failed finding furthest beyond its limit, else the finding closest to its limit; None if none."""
+        """Failed finding furthest beyond its limit, or else the passed finding closest to its limit, or None."""
         return closest_to_limit(self.findings)
 
     @property
@@ -205,7 +208,7 @@ class RuleFindings:
         return min(undecided_findings(self.findings), key=worst_first_key) if self.state == "open" else self.closest
 
     @property
-    def passed_otherwise(self) -> tuple[Finding, ...]:
+    def passed_beyond_limit(self) -> tuple[Finding, ...]:
         """Findings that pass although their number is beyond the limit; their reason explains it."""
         return tuple(
             finding
@@ -216,36 +219,42 @@ class RuleFindings:
     @property
     def count_text(self) -> str:
         """Text such as "3 of 4 ok": the number of passed findings, and the number of judged findings."""
-        return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
+        return (
+            f"{self.judged_count - len(self.failed)} of {self.judged_count} ok" if self.judged_count else "not judged"
+        )
 
     @property
     def tally_text(self) -> str:
         """Text such as "2 of 3 fail, 1 not judged" or "3 ok": the numbers of findings, for a cell of a table."""
-        failed_count, unjudged_count = len(self.failed), len(self.findings) - self.judged
-        judged_text = f"{failed_count} of {self.judged} fail" if failed_count else f"{self.judged} ok"
-        parts = [judged_text if self.judged else "", f"{unjudged_count} not judged" if unjudged_count else ""]
+        failed_count, unjudged_count = len(self.failed), len(self.findings) - self.judged_count
+        judged_text = f"{failed_count} of {self.judged_count} fail" if failed_count else f"{self.judged_count} ok"
+        parts = [judged_text if self.judged_count else "", f"{unjudged_count} not judged" if unjudged_count else ""]
         return ", ".join(filter(None, parts))
 
     @property
     def failure_heading(self) -> str:
-        """Rule and place of its worst failed finding, with the number of failed findings if there are several."""
+        """Rule and place of its worst failed finding, with the number of failed findings if there are several.
+
+        Raises IndexError for a rule without failed findings.
+        """
         worst_finding = self.failed[0]
         if len(self.failed) == 1:
             return finding_heading(worst_finding)
-        return (
-            f"{self.words.word}: {len(self.failed)} of {self.judged} places fail; the worst is at {worst_finding.where}"
-        )
+        count_text = f"{len(self.failed)} of {self.judged_count} places fail"
+        return f"{self.words.word}: {count_text}; the worst is at {worst_finding.where}"
 
     @property
     def cells(self) -> tuple[str, ...]:
         """Row of the rule in a table with `RESULT_COLUMNS`; a rule that was not judged has its reason as place."""
-        place = self.shown.where if self.shown else "" if self.judged else self.findings[0].reason
+        place = self.shown.where if self.shown else "" if self.judged_count else self.findings[0].reason
         numbers = number_texts(self.shown) if self.shown else NumberTexts()
         return (self.words.word, state_text(self.state), self.tally_text, place, *numbers)
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
-    """Group findings by rule in the order of `RULE_WORDS`; a rule without findings is left out.
+    """Group findings by rule in the order of `RULE_WORDS`, with photo overlap as a group of its own.
+
+    A rule without findings is left out.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place

@@ -32,11 +32,8 @@ class _ReferenceFile(DocumentConfig):
 
 
 @cache
-def _file_reader() -> TypeAdapter[_ReferenceFile]:
-    """Return the reader of the attachment.
-
-    It is built at its first use, because most flights have no attachment.
-    """
+def _attachment_adapter() -> TypeAdapter[_ReferenceFile]:
+    """Return the adapter that parses and validates the attachment; it is built at its first use."""
     return TypeAdapter(_ReferenceFile)
 
 
@@ -61,7 +58,7 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     ReferenceFlights(airframe=None, deciding=None, tried=None)
     """
     try:
-        file = _file_reader().validate_json(text)
+        file = _attachment_adapter().validate_json(text)
     except ValidationError as error:
         raise LogError(**first_fault(error, container=JSON_OBJECT).at(source)) from error
     rules = [rule for rule, _ in file.airframe.failed] if file.airframe is not None else []

@@ -30,10 +30,11 @@ class Judge(Protocol):
 
 # Function that judges only a mission's items, for any autopilot.
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
-# Function that judges how a flight ended (reason for its end) and whether its log is complete.
+# Function that judges the end of a flight.  Its last two arguments are the reason for the end, and True if the log is
+# complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
-# Function that judges together all parts of an imported flight that followed the mission, and whether planfly's own log
-# is complete.
+# Function that judges all parts of an imported flight that followed the mission together.  Its last argument is True if
+# planfly's own log of the flight is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
 # Function that replaces findings of other rules, or adds to their reasons, after all rules have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]

@@ -75,16 +75,16 @@ _HORIZONTAL_SHIFTS: tuple[tuple[ChangeKind, str, float], ...] = (
 _VERTICAL_SHIFTS: tuple[tuple[ChangeKind, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
-def suggest_passing_zone(
+def suggest_shift_past_zone(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
 
     finding: the finding on the violated zone.
 
-    If the planned path violates the zone, its violating legs are shifted.  The shift also covers a greater depth of the
-    flight.  If only the flight violates the zone, the shift is measured on the flown legs.  The path then keeps the
-    navigation error as its distance.
+    The shift is measured on the violating legs: on the planned path if it violates the zone, otherwise on the flown
+    track.  If the flight violates the zone more deeply than the plan, the shift grows by the difference.  The shifted
+    path clears the zone by the navigation error and `SUGGESTION_LENGTH_MARGIN_M`.
     """
     zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if zone_index is None or "entry leg" not in facts:
@@ -125,10 +125,12 @@ def suggest_passing_zone(
 def _smallest_shift(
     moves: Records, zone: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, max_shift: float
 ) -> float | None:
-    """Return the smallest shift (m) in one direction that ends a violation.
+    """Return the smallest shift of a path in one direction that ends its violation of a zone, m.
 
-    Return None if the shift exceeds `max_shift` (m), if it depends on unknown ground, or if it is not found within
+    Return None if the shift reaches `max_shift` (m), if it depends on unknown ground, or if it is not found within
     `ZONE_SUGGESTION_TRIAL_COUNT` steps.
+    moves: the path, (m,) of dtype `logs.verdict.measures.path_moves.MOVE`.
+    zone: record of the one zone.
     axis: coordinate that is shifted: "east", "north" or "up".
     sign: direction of the shift, 1 or -1.
 
@@ -160,7 +162,7 @@ _SizedSuggestion = tuple[float, Suggestion]
 _MAX_RELATIVE_CHANGE = 9.0
 
 
-def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, ...]:
+def _sort_by_change(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, ...]:
     """Sort alternatives by their relative change, and drop those above `_MAX_RELATIVE_CHANGE`."""
     helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
@@ -208,9 +210,9 @@ def suggest_gentler_slope(
             # A leg of the opposite slope makes the arc flatter, so it is not changed.
             if rise * arc.tangent > 0.0:
                 wanted_rise = math.copysign(math.floor(abs(rise)), rise)
-                changes.append(Change("rise", requirements.leg(k), current=None, wanted=wanted_rise, unit="m"))
+                changes.append(Change("rise", requirements.leg_place(k), current=None, wanted=wanted_rise, unit="m"))
         return (tuple(changes),) if changes else ()
-    place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
+    place, sign = requirements.leg_place(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     gentler_height_change = leg_length * math.tan(max_slope)
     longer_length = height_change / math.tan(max_slope)
     alternatives: list[_SizedSuggestion] = []
@@ -228,7 +230,7 @@ def suggest_gentler_slope(
     # A vertical leg has no length to compare with.
     relative_growth = longer_length / leg_length - 1.0 if leg_length >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
     alternatives.append((relative_growth, (Change("length", place, leg_length, float(math.ceil(longer_length)), "m"),)))
-    return (*_suggest_other_frame(requirements.setup, Frame.GLOBAL), *_smallest_first(alternatives))
+    return (*_suggest_altitude_frame(requirements.setup, Frame.GLOBAL), *_sort_by_change(alternatives))
 
 
 def suggest_gentler_landing(
@@ -253,8 +255,8 @@ def suggest_gentler_landing(
     height = altitude - ground
     step = float(math.ceil(height - length * math.tan(max_slope)))
     longer_length = float(math.ceil(height / math.tan(max_slope)))
-    lower = Change("descent", requirements.waypoint(leg), current=None, wanted=step, unit="m")
-    further = Change("length", requirements.leg(leg), length, longer_length, "m")
+    lower = Change("descent", requirements.waypoint_place(leg), current=None, wanted=step, unit="m")
+    further = Change("length", requirements.leg_place(leg), length, longer_length, "m")
     alternatives: list[_SizedSuggestion] = [
         (step / height, (lower,)),
         (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,)),
@@ -262,7 +264,7 @@ def suggest_gentler_landing(
     step_east, step_north = (requirements.points[leg + 1, :2] - requirements.points[leg, :2]).tolist()
     course = math.atan2(step_east, step_north)
     return (
-        *_smallest_first(alternatives),
+        *_sort_by_change(alternatives),
         *_suggest_landing_against_wind(requirements, finding.place, course, ground),
     )
 
@@ -283,7 +285,7 @@ def suggest_gentler_turn(
     planned_turn = abs(float(requirements.turns[corner]))
     if planned_turn <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
         return ()
-    place, max_turn = requirements.waypoint(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
+    place, max_turn = requirements.waypoint_place(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
     alternatives: list[_SizedSuggestion] = []
     if source == "aircraft" and math.isfinite(requirements.length_before[corner]):
         speed = _turn_speed(requirements, corner)
@@ -305,14 +307,14 @@ def suggest_gentler_turn(
             leg_length = float(requirements.runs[leg])
             if math.isfinite(needed_length) and needed_length > leg_length:
                 wanted_length = float(math.ceil(needed_length))
-                longer_legs.append(Change("length", requirements.leg(leg), leg_length, wanted_length, "m"))
+                longer_legs.append(Change("length", requirements.leg_place(leg), leg_length, wanted_length, "m"))
                 relative_growth = max(relative_growth, needed_length / leg_length - 1.0)
         alternatives += [(relative_growth, tuple(longer_legs))] if longer_legs else []
     degrees = _gentler_turn(requirements, corner, max_turn)
     if degrees > 0.0:
         change = Change("turn", place, math.degrees(planned_turn), degrees, "deg")
         alternatives.append((1.0 - max_turn / planned_turn, (change,)))
-    return _smallest_first(alternatives)
+    return _sort_by_change(alternatives)
 
 
 def suggest_stating_bank(
@@ -386,10 +388,10 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
 
 
 def _level_speeds(requirements: RouteRequirements, altitude: float, current_speed: float, factor: float) -> list[float]:
-    """Return commanded airspeeds at which level flight is possible at an altitude (m AMSL), m/s.
+    """Return commanded airspeeds for level flight at an altitude (m AMSL), m/s, the closest to `current_speed` first.
 
-    They are multiples of `SUGGESTION_SPEED_STEP_MPS`, sorted by their difference from `current_speed`.  If the maximum
-    airspeed is uncertain, only airspeeds that are certainly possible are returned.
+    They are multiples of `SUGGESTION_SPEED_STEP_MPS`, and at least `MIN_SUGGESTED_SPEED_RATIO` times the slowest level
+    speed.  If the maximum airspeed is uncertain, only airspeeds that are certainly possible are returned.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
@@ -435,9 +437,9 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest airspeed below the present command at which a turn fits its legs, m/s.
+    """Return the highest commanded airspeed below the present one at which a turn fits its legs, m/s.
 
-    Return None if it fits at no lower airspeed.
+    Return None if the turn fits at no lower airspeed.
 
     corner: waypoint at which the aircraft turns.
     """
@@ -466,7 +468,7 @@ def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
 
 
 def _round_to_meter(length: float) -> float:
-    """Round a length (m) to a whole meter for a suggestion."""
+    """Round a length to whole meters."""
     return float(round(length))
 
 
@@ -501,9 +503,10 @@ def home_height(setup: FlightSetup) -> float:
 
 
 def home_height_text(setup: FlightSetup) -> str:
-    """Describe a mission's home that is clearly above or below the ground there; "" for any other home.
+    """State how far a mission's home is above or below the ground there; "" within a tolerance.
 
-    An imported log records the home of its flight, so its altitude is described only beyond `HOME_ERROR_M`.
+    The tolerance is `HOME_ALTITUDE_TOLERANCE_M`, or `HOME_ERROR_M` for an imported log, which records the home of its
+    flight.  The text is "" also if the height is unknown or not used (`home_height`).
     """
     height = home_height(setup)
     tolerance = HOME_ALTITUDE_TOLERANCE_M if setup.imported_log is None else HOME_ERROR_M
@@ -514,7 +517,7 @@ def home_height_text(setup: FlightSetup) -> str:
 
 
 def lowest_clearance(findings: Sequence[Finding]) -> float:
-    """Return the minimum height above ground in the clearance findings of a verdict, m; NaN without any."""
+    """Return the lowest height above ground that a clearance finding with a margin states, m; NaN without one."""
     heights = [
         finding.margin + (finding.limit or 0.0)
         for finding in findings
@@ -524,7 +527,7 @@ def lowest_clearance(findings: Sequence[Finding]) -> float:
 
 
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest setting home on the ground if it is clearly above or below the ground; otherwise return ()."""
+    """Suggest setting home on the ground if it is more than `HOME_ALTITUDE_TOLERANCE_M` off; otherwise return ()."""
     home, height = setup.mission.home, home_height(setup)
     # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
     # another altitude of this item would not help.
@@ -534,8 +537,8 @@ def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
     return ((Change("home altitude", MISSION, home.alt, round(home.alt - height, 1), "m"),),)
 
 
-def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
-    """Suggest setting home on the ground, and raising the legs that are then too low.
+def _suggest_home_and_higher_legs(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
+    """Suggest setting home on the ground and, together with it, raising the legs that are then too low.
 
     Return () if home is on the ground already or if the terrain is unknown.
     """
@@ -550,15 +553,16 @@ def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Sugges
         shortfall = setup.limits.min_clearance - height + SUGGESTION_LENGTH_MARGIN_M
         if shortfall > SUGGESTION_LENGTH_MARGIN_M:
             raised.append(
-                Change("height", requirements.leg(leg), current=None, wanted=_round_to_meter(shortfall), unit="m")
+                Change("height", requirements.leg_place(leg), current=None, wanted=_round_to_meter(shortfall), unit="m")
             )
     return ((*suggestions[0], *raised),)
 
 
-def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
-    """Suggest another altitude frame if items fit the terrain only in that frame; otherwise return ().
+def _suggest_altitude_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
+    """Suggest reading altitudes in a given frame if items fit the terrain only in this frame; otherwise return ().
 
-    frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
+    frame: the frame to suggest: GLOBAL_RELATIVE_ALT for items that would be below the ground, GLOBAL for items that
+        would be too high above home.
     """
     below_ground, too_high = find_misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not (too_high if frame == Frame.GLOBAL else below_ground):
@@ -567,13 +571,16 @@ def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, 
     return ((Change("altitude frame", MISSION, float(current), float(frame), ""),),)
 
 
-def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest setting home on the ground, and reading heights above home as AMSL, if these lower the path."""
+def _suggest_lower_altitudes(setup: FlightSetup) -> tuple[Suggestion, ...]:
+    """Suggest readings that lower the path: a home above the ground set on the ground, too high altitudes as AMSL.
+
+    Return () if neither applies.
+    """
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
-    return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
+    return (*home_on_ground, *_suggest_altitude_frame(setup, Frame.GLOBAL))
 
 
-# Step in which the altitude of an RTL is suggested, m.
+# A suggested RTL altitude is a multiple of this, m.
 RTL_ALTITUDE_STEP_M = 1.0
 
 
@@ -582,13 +589,17 @@ def suggest_flying_higher(
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground.
 
-    Two suggestions come first if they apply.  A home below the ground is set on the ground, if the leg is flown at
-    heights above home.  Altitudes of items below the ground are read as heights above home if they then fit the
-    terrain.  Over varied ground, following the terrain is also suggested.  A leg of an RTL is raised by the parameter
-    of the RTL altitude.
+    If home is below the ground and the leg is flown at heights above home, setting home on the ground is the only
+    suggestion; the leg is raised together with it if that is not enough.  Otherwise the first suggestion is to read the
+    altitudes of items below the ground as heights above home, if they then fit the terrain.  A leg of an RTL is raised
+    by the RTL altitude's parameter, by the waypoint at which the RTL begins, or by both.  Any other leg is raised as a
+    whole, or follows varied ground.
+
+    For a finding on the flight as a whole, suggest setting home on the ground and raising the legs that are then too
+    low.
     """
     if finding.place == FLIGHT:
-        return _suggest_launch_from_ground(requirements)
+        return _suggest_home_and_higher_legs(requirements)
     if finding.limit is None or finding.margin is None:
         return ()
     shortfall = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
@@ -608,7 +619,7 @@ def suggest_flying_higher(
             return home_on_ground
         raised = Change("height", finding.place, current=None, wanted=_round_to_meter(remaining_shortfall), unit="m")
         return ((*home_on_ground[0], raised),)
-    suggestions = list(_suggest_other_frame(setup, Frame.GLOBAL_RELATIVE_ALT))
+    suggestions = list(_suggest_altitude_frame(setup, Frame.GLOBAL_RELATIVE_ALT))
     if finding.place.index in setup.route.rtl_legs:
         # Each of these changes alone may need more than the shortfall: a higher RTL altitude by a parameter, a higher
         # waypoint where the RTL begins, or both.
@@ -624,7 +635,9 @@ def suggest_flying_higher(
         placed_items = {item.seq for item in setup.mission.items if item.command in PLACES}
         higher_start: Suggestion = ()
         if start is not None and int(setup.route.items[start]) in placed_items:
-            higher_start = (Change("height", requirements.waypoint(start), None, _round_to_meter(shortfall), "m"),)
+            higher_start = (
+                Change("height", requirements.waypoint_place(start), None, _round_to_meter(shortfall), "m"),
+            )
         both = (*higher_end, *higher_start) if higher_end and higher_start else ()
         return (*suggestions, *(suggestion for suggestion in (higher_end, both, higher_start) if suggestion))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
@@ -638,17 +651,17 @@ def suggest_flying_higher(
     return tuple(suggestions)
 
 
-# Smallest difference of the ground's altitude along a leg for which following the ground is suggested, m.
+# Following the ground is suggested on a leg along which the ground's altitude varies by at least this, m.
 _MIN_FOLLOWED_RELIEF_M = 20.0
 
 
 def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggestion:
-    """Return changes that let all legs that are too low over varied ground follow the ground.
+    """Return changes that let the finding's leg, and all other legs too low over varied ground, follow the ground.
 
-    The end of a leg keeps its height above ground, but gets at least the required height plus `HEIGHT_ERROR_LIMIT_M`.
-    A leg is not changed if it already follows the ground, or if its item states no height to fly at, such as a landing
-    or an RTL.  Return () if the leg of the finding is not among the changed legs, or if the autopilot cannot follow
-    terrain.
+    The end of a changed leg keeps its height above ground, or gets the required height plus `HEIGHT_ERROR_LIMIT_M` if
+    that is more.  A leg is not changed if it already follows the ground, or if its item states no height to fly at,
+    such as a landing or an RTL.  Return () if the finding's leg cannot be changed, if the ground is unknown, or if the
+    autopilot cannot follow terrain.
     """
     setup, leg, limit = requirements.setup, finding.place.index, finding.limit
     terrain = setup.scenario.terrain
@@ -669,7 +682,7 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
         if followed_leg == leg or float(heights.min()) < limit:
             height = _round_to_meter(max(float(heights[-1]), limit + HEIGHT_ERROR_LIMIT_M))
             changes.append(
-                Change("terrain height", requirements.leg(followed_leg), current=None, wanted=height, unit="m")
+                Change("terrain height", requirements.leg_place(followed_leg), current=None, wanted=height, unit="m")
             )
     return tuple(changes) if any(change.place.index == leg for change in changes) else ()
 
@@ -677,13 +690,13 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
 def suggest_flying_lower(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg lower, below the maximum height above ground; return () if no leg exceeds it."""
+    """Suggest flying a leg lower, below the maximum height above ground; return () if the leg does not exceed it."""
     heights = [height for height in (finding.planned, finding.flown) if height is not None]
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
     excess = _round_to_meter(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
     return (
-        *_suggest_lower_reading(requirements.setup),
+        *_suggest_lower_altitudes(requirements.setup),
         (Change("descent", finding.place, current=None, wanted=excess, unit="m"),),
     )
 
@@ -693,8 +706,8 @@ def suggest_better_launch(
 ) -> tuple[Suggestion, ...]:
     """Suggest a launch into the wind, or a faster throw or catapult; return () without a take-off.
 
-    In a tailwind, suggest the course into the wind, or the other direction of the runway.  Suggest a throw or catapult
-    that reaches the minimum airspeed of level flight.
+    In a tailwind, suggest the course into the wind, or on a runway the opposite course.  For a throw or catapult that
+    is too slow, suggest the speed that reaches the minimum airspeed of level flight.
     """
     ground = requirements.ground_phases
     take_off = None if ground is None else ground.procedures.take_off
@@ -743,12 +756,12 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower altitudes, then a path further inside the area; () for a path that stays inside."""
+    """Suggest lower altitudes if they were misread, then a path further inside the area; () if it stays inside."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)
     return (
-        *_suggest_lower_reading(requirements.setup),
+        *_suggest_lower_altitudes(requirements.setup),
         (Change("inset", FLIGHT, current=None, wanted=inset, unit="m"),),
     )
 
@@ -769,7 +782,7 @@ def suggest_using_less_energy(
         # The flight ended with an empty battery or tank; only the prediction covers the whole mission.
         energy = np.fmax(finding.planned, finding.flown)
     envelope = requirements.setup.envelope
-    # The energy of an imported log is measured; other energies may be as large as their upper limit with 95 %.
+    # The energy in an imported log was measured; any other energy is raised to its one-sided 95 % limit.
     is_measured = requirements.setup.imported_log is not None and finding.flown is not None
     ratio = energy / finding.limit * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     if ratio <= 1.0:

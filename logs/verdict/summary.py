@@ -31,9 +31,9 @@ from world.wording import count_text, is_one_edit
 
 # Maximum number of failed findings that the first line names.
 _MAX_NAMED_FINDINGS = 4
-# Largest number of letters of a part of a parameter's name that counts as short.
+# A part of a parameter's name is short if it has at most this many letters.
 _LONGEST_SHORT_PART = 2
-# Words for what a path passed too closely, by rule.
+# Words after the distance in a note on a missile or zone that a path passed closely, by rule.
 _NEAR_MISS_PLACES = {"threat": "outside a missile's range", "fence": "from a zone's limit"}
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
@@ -43,9 +43,9 @@ _LEVEL_TITLES = {
 
 
 def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return headline notes on an uncertain aircraft, a doubtful home altitude, and a missing landing.
+    """Return notes for the headline on an uncertain aircraft, a doubtful home altitude, and a missing landing.
 
-    There is no note on home's altitude if a finding already reports it.
+    The note on home's altitude is left out if a finding already reports it.
     """
     source, home_text = setup.envelope.source, home_height_text(setup)
     notes = [f"the aircraft's model is from {source}"] if source else []
@@ -128,7 +128,9 @@ def undecided_text(findings: Sequence[Finding]) -> str:
 
 
 def _first_briefs(briefs: Sequence[str], noun: str) -> list[str]:
-    """Return the first `_MAX_NAMED_FINDINGS` texts, and the count of the others.
+    """Return the first `_MAX_NAMED_FINDINGS` texts, and a text with the count of the others.
+
+    noun: noun for what is counted, in the singular.
 
     >>> _first_briefs(["a", "b", "c", "d", "e"], "item")
     ['a', 'b', 'c', 'd', '1 more item']
@@ -220,7 +222,7 @@ def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return a note on a missile's range and on a zone's limit that the path missed by less than navigation may err."""
+    """Return notes on missiles' ranges and zones that the path clears by less than the navigation error."""
     notes = []
     for finding in findings:
         place = _NEAR_MISS_PLACES.get(finding.rule)
@@ -244,7 +246,7 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _passing_errors(findings: Sequence[Finding], rule: str, fact_name: str) -> list[tuple[float, Place]]:
-    """Return value and place of one fact from all findings of a rule, except from failed findings."""
+    """Return the value and the place of one fact in each finding of a rule that has it and did not fail."""
     return [
         (fact.value, finding.place)
         for finding in findings
@@ -471,7 +473,10 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line on the minimum clearance less the terrain's stated error; [] if none is stated."""
+    """Return a line on the lowest clearance less the terrain's error; [] if the terrain states no error.
+
+    Return [] also if no finding states a clearance.
+    """
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     clearances = [
         finding.planned if finding.flown is None else finding.flown

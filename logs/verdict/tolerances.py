@@ -27,7 +27,8 @@ HOME_ERROR_M = 50.0
 # m.  A leg may be this far above the maximum height above ground, or above the ceiling: the effect of `ROUNDING_M` on
 # steep ground.
 HEIGHT_TOLERANCE_M = 0.1
-# m.  A loiter's radius may be this much smaller than the radius at the bank limit: 1e-7 degrees at its center.
+# m.  A loiter's radius may be this much smaller than the radius at the bank limit: its center is rounded to 1e-7
+# degrees.
 LOITER_RADIUS_TOLERANCE_M = 0.02
 # Laps.  A loiter may lack this many laps if the autopilot steers to its center. Such an autopilot joins and leaves the
 # circle on other courses than drawn; joining it on the other side makes a difference of half a lap.
@@ -123,8 +124,8 @@ ABILITY_SIGMAS = 3.0
 # s.  Shortest time for which the throttle must be at a limit, while the mean airspeed is off its command, to show that
 # a leg is too steep. Shorter times at a limit are normal.
 SATURATED_TIME_S = 5.0
-# s.  On a constant slope at airspeed V, air that rises at w adds airspeed at the rate g w/V. Drag removes this airspeed
-# after about this time.
+# s.  On a constant slope at airspeed V, air that rises at w adds airspeed at the rate g w/V. Drag removes this gain
+# with about this time constant.
 SPEED_MEMORY_S = 12.0
 # m/s.  Smallest airspeed V with which the rate g w/V of `SPEED_MEMORY_S` is computed. It bounds the rate for an
 # aircraft that has nearly stopped.

@@ -104,7 +104,10 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """True if the verdict is flyable, or is complete and undecided only in climb-out, approach or returns.
+        """True if the verdict is flyable, or is complete and leaves open only checks that a flight cannot decide.
+
+        These checks are `APART_FROM_FLIGHT`: paths from and to the ground, returns to launch and glides, and the common
+        area of photos.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_PATH, make_finding
@@ -210,7 +213,7 @@ class Verdict:
 
     @property
     def is_only_incomplete(self) -> bool:
-        """True if nothing failed but the completion of the flight."""
+        """True if the only thing that failed is the completion of the flight."""
         is_flight = self.state == "fail" and self.level != "plan" and not self.complete
         return is_flight and all(finding.rule == "completion" for finding in self.failed)
 
@@ -228,7 +231,7 @@ class Verdict:
 
     @property
     def sign(self) -> str:
-        """Sign of the state, or "!" if nothing failed but the completion of the flight."""
+        """Sign of the state, or "!" if the only thing that failed is the completion of the flight."""
         return "!" if self.is_only_incomplete else STATE_SIGNS[self.state]
 
     @property
@@ -275,11 +278,11 @@ class Verdict:
         return next((finding for finding in worst_findings if self.remedy_text(finding)), None)
 
     def findings_to_list(self, max_failed_and_undecided: int) -> list[tuple[int, Finding]]:
-        """Return the findings to show in a short list, each with its index in `findings`.
+        """Return the findings for a short list, each with its index in `findings`.
 
-        These are failed and undecided findings, then for each rule the passed finding closest to its limit.
+        They are the failed and undecided findings, and then, for each rule whose closest finding passed, that finding.
 
-        max_failed_and_undecided: maximum number of failed and undecided findings.
+        max_failed_and_undecided: maximum number of failed and undecided findings in the list.
         """
         undecided = {id(finding) for finding in self.undecided_findings}
         closest = {id(rule.closest) for rule in self.rules}
@@ -289,7 +292,10 @@ class Verdict:
         return [*listed_findings[:max_failed_and_undecided], *closest_findings]
 
     def junit_suite(self, name: str) -> JunitSuite:
-        """Return the verdict as a JUnit suite.  name: name of the judged plan or flight."""
+        """Return the verdict as a JUnit test suite.
+
+        name: name of the judged plan or flight.
+        """
         return verdict_suite(name, self.lines, self.findings, passes=self.flyable)
 
     def to_junit(self, name: str) -> str:

@@ -28,7 +28,7 @@ RULE_NOUNS = {
     "link": "radio link",
     "departure": "loss of control",
 }
-# Rules of the route, each with the rule that judges the same part in a flight.
+# Rules that judge only the planned route, each with the rule that judges the same part of a flight.
 FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 # Greatest length of a statement in a headline, characters.
 _MAX_STATEMENT_LENGTH = 80
@@ -52,7 +52,7 @@ _CLAUSE_ENDS = (
 
 
 def place_text(place: Place) -> str:
-    """Return the name of a place in texts.
+    """Return the name of a place for use in texts.
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
@@ -97,7 +97,7 @@ def noun_with_place(noun: str, place: Place) -> str:
 
 
 def threat_text(place: Place) -> str:
-    """Return the name of the threat of a missile or a radar.
+    """Return the name of the threat to which a missile or radar belongs, or its number from 1 if it has no name.
 
     >>> threat_text(Place("missile", 0, name="Alfa")), threat_text(Place("missile", 2))
     ('Alfa', 'threat 3')
@@ -234,7 +234,10 @@ def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
 
 
 def _length_text(change: Change) -> str:
-    """State a leg with its present and its new length, such as "leg 1 from 150 m to 260 m"."""
+    """Return a leg with its present and its new length, such as "leg 1 from 150 m to 260 m".
+
+    For a vertical leg, the text states this instead of the present length.
+    """
     current = change.current or 0.0
     place_name = place_text(change.place)
     if current < MIN_LEG_LENGTH_M:
@@ -306,7 +309,7 @@ def without_trial(suggestion: Suggestion) -> Suggestion:
 
 
 def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
-    """Return a margin with its sign and unit; a negative margin that passes is within the tolerance.
+    """Return a margin with its sign and unit, and with a note if a negative margin passes within the tolerance.
 
     tolerance: the tolerance, in `unit`; None or 0 if it is not known.
 
@@ -400,7 +403,7 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Describe the parameter that decides, the effect of its value, and the value that would pass.
+    """Describe the deciding parameter: its current value, the effect of this value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass'
@@ -476,7 +479,7 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def energy_left_text(energy: float) -> str:
-    """Return the energy left at the end of a flight, or the energy that is missing, in Wh.
+    """Return a text on the energy left at the end of a flight, Wh; a negative energy is missing.
 
     >>> energy_left_text(11.87), energy_left_text(-3.0)
     ('11.9 Wh left', '3 Wh missing')
@@ -499,7 +502,7 @@ _MAX_DIGITS = 9
 
 
 def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
-    """Format two values with their unit, with enough digits to show that different values differ.
+    """Format a value and its limit with their unit, with enough digits to show that they differ if they do.
 
     >>> compared_texts(-7.04, -7.02, "deg"), compared_texts(12.0, 15.0, "m")
     (('-7.04°', '-7.02°'), ('12 m', '15 m'))

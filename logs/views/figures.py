@@ -13,7 +13,7 @@ from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glides_text import glides_headline
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
@@ -217,7 +217,7 @@ FIGURES = (
             "Map, north up: the route coloured by the outcome of a return from there, and the worst returns."
         ),
         caption=lambda subject: (
-            ("" if subject.returns is None else _make_sentence(headline(subject.returns.returns)))
+            ("" if subject.returns is None else _make_sentence(returns_headline(subject.returns.returns)))
             + "The worst returns are drawn; their numbers refer to the profiles below."
         ),
     ),

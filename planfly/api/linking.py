@@ -13,7 +13,7 @@ from logs.verdict.measures.link_outages import LinkAlongPath
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track, flown_phases
 from logs.verdict.returns.judge_returns import Returns
-from logs.verdict.returns.returns_text import range_text
+from logs.verdict.returns.returns_text import return_range_text
 from logs.verdict.rules.link_rule import duration_text, judge_link, period_text
 from logs.verdict.wording import place_text
 from planfly.api.api_function import api_function
@@ -115,7 +115,7 @@ class LinkResult:
         if self.returns is None:
             return ()
         return tuple(
-            f"return from {range_text(return_range, self.returns, self.setup.scenario)}"
+            f"return from {return_range_text(return_range, self.returns, self.setup.scenario)}"
             for return_range in self.returns.ranges
         )
 

@@ -24,12 +24,12 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import return_starts
 from logs.verdict.returns.returns_text import (
-    describe_causes,
-    describe_landing,
-    headline,
+    describe_return_causes,
+    describe_rtl_ending,
     point_of_no_return_text,
-    range_text,
     remedy_text,
+    return_range_text,
+    returns_headline,
 )
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.verdict.suggestions import home_height, home_height_text
@@ -103,18 +103,18 @@ class ReturnsResult:
     @property
     def headline(self) -> str:
         """Summary of all returns, in one line."""
-        return headline(self.returns)
+        return returns_headline(self.returns)
 
     @property
     def cause_lines(self) -> tuple[str, ...]:
         """Lines on the events that trigger a return, on the events that do not, and on the end of a return."""
-        return (*describe_causes(self.returns.causes), *describe_landing(self.returns))
+        return (*describe_return_causes(self.returns.causes), *describe_rtl_ending(self.returns))
 
     @property
     def range_lines(self) -> tuple[str, ...]:
         """One line for each period of the flight whose returns have the same outcome, the worst first."""
         return tuple(
-            range_text(return_range, self.returns, self.setup.scenario) for return_range in self.returns.ranges
+            return_range_text(return_range, self.returns, self.setup.scenario) for return_range in self.returns.ranges
         )
 
     @property

@@ -5,7 +5,7 @@ from datetime import UTC, timedelta
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from logs.verdict.conditions import flown_lines
+from logs.verdict.conditions import flown_condition_lines
 from planfly.campaigns import battery_text, ground_risk_text, window_text
 from planfly.campaigns.find_battery import BatteryResult
 from planfly.campaigns.find_ground_risk import GroundRiskResult
@@ -40,7 +40,7 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
         lines=[
             window_text.answer_line(result),
             *window_text.unjudged_lines(result),
-            *flown_lines(result.base.conditions()),
+            *flown_condition_lines(result.base.conditions()),
         ],
         figures=[(figure, "Chart of the departures: flyable flights, wind and least energy")],
         tables=[PageTable([*times, *zip(window_text.DEPARTURE_COLUMNS, styles, strict=True)], rows)],
@@ -69,7 +69,7 @@ def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerP
         style=STYLES[result.is_enough],
         lines=[
             battery_text.answer_line(result),
-            *flown_lines(result.base.conditions()),
+            *flown_condition_lines(result.base.conditions()),
             *battery_text.battery_lines(result),
         ],
         figures=[(figure, "Share of the flights that keep the reserve, by the capacity of the battery")],
@@ -110,7 +110,7 @@ def ground_risk_page(result: GroundRiskResult, figure: Figure, command: str) -> 
         style="reached" if result.is_judged else "undecided",
         lines=[
             ground_risk_text.answer_line(result),
-            *flown_lines(result.base.conditions()),
+            *flown_condition_lines(result.base.conditions()),
             *ground_risk_text.risk_lines(result),
         ],
         figures=[(figure, "Map of the ground risk: flight geography, operational volume and ground risk buffer")],

@@ -129,7 +129,7 @@ def leg_names(result: BatteryResult) -> list[str]:
     requirements = route_requirements(result.base.nominal_setup())
     numbers = requirements.setup.route.leg_numbers
     first_legs = np.searchsorted(numbers, np.arange(int(numbers[-1]) + 1)).tolist()
-    return [place_text(requirements.leg(leg)) for leg in first_legs]
+    return [place_text(requirements.leg_place(leg)) for leg in first_legs]
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:

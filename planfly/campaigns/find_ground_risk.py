@@ -28,7 +28,7 @@ from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import true_airspeed_route
 from logs.verdict.returns.glide_map import glide_slopes
-from logs.verdict.returns.judge_returns import make_return_world, without_engine_world
+from logs.verdict.returns.judge_returns import engine_out_world, make_return_world
 from logs.verdict.returns.return_starts import flown_starts
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import draw_flight
@@ -235,7 +235,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
-        gliding_world = without_engine_world(world)
+        gliding_world = engine_out_world(world)
         gliding_targets = [gliding_world.target(row) for row in starts.rows]
         gliding = gliding_world.fly(starts.rows, gliding_targets, store_positions=True, engine_out=True)
         glides = [

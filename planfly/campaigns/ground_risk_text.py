@@ -1,7 +1,7 @@
 """Describe the ground risk of a mission in lines, and in a table for an application."""
 
-from logs.verdict.conditions import flown_lines
-from logs.verdict.returns.judge_returns import make_return_world, returning_title, without_engine_world
+from logs.verdict.conditions import flown_condition_lines
+from logs.verdict.returns.judge_returns import engine_out_world, make_return_world, rtl_autopilot_title
 from logs.verdict.returns.returns_text import return_law_lines
 from planfly.campaigns.find_ground_risk import GroundRiskResult
 from planfly.campaigns.sora import IGRC_COLUMNS
@@ -113,13 +113,15 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
         )
     spread = result.base.dispersions.name
     setup = result.base.nominal_setup()
-    returns_text = f"; a return to launch by {returning_title(setup)}'s rules starts every {result.goal.interval:g} s"
+    returns_text = (
+        f"; a return to launch by {rtl_autopilot_title(setup)}'s rules starts every {result.goal.interval:g} s"
+    )
     if setup.mission.home is None:
         returns_text = ", without returns to launch"
     lines.append(f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}{returns_text}")
     if result.goal.glide and setup.mission.home is not None:
         world = make_return_world(setup)
-        if without_engine_world(world) is not world:
+        if engine_out_world(world) is not world:
             lines.append(
                 f"engine-out glides follow ArduPlane's rules, because {world.autopilot.title}'s are not simulated"
             )
@@ -129,7 +131,9 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
 def table_text(result: GroundRiskResult) -> str:
     """Return the table for an application, as Markdown."""
     table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in table_rows(result))
-    conditions = "\n".join(f"- {line}" for line in (*flown_lines(result.base.conditions()), *_flight_lines(result)))
+    conditions = "\n".join(
+        f"- {line}" for line in (*flown_condition_lines(result.base.conditions()), *_flight_lines(result))
+    )
     return (
         f"# Ground risk of {result.base.name}\n\n{answer_line(result)}\n\n"
         f"| quantity | value | source |\n|---|---|---|\n{table}\n\n"

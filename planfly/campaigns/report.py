@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from logs.verdict.conditions import flown_lines
+from logs.verdict.conditions import flown_condition_lines
 from logs.verdict.junit import JunitCase, JunitSuite, answer_case
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
@@ -618,7 +618,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
         *answer_lines,
         *calm_lines,
         *_flown_bound_lines(winds),
-        *(() if winds.conditions is None else flown_lines(winds.conditions)),
+        *(() if winds.conditions is None else flown_condition_lines(winds.conditions)),
         *deciding_lines,
         *lines_without_failures,
         *lost_lines,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from logs.verdict.conditions import Conditions, flown_lines
+from logs.verdict.conditions import Conditions, flown_condition_lines
 from logs.verdict.junit import JunitCase, JunitSuite
 from logs.verdict.measures.mission_ends import missing_home_text
 from logs.verdict.rule_words import RULE_WORDS
@@ -470,7 +470,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         f"  two-sided {confidence_text} interval of the probability: {estimate.interval.low:.4f} to"
         f" {estimate.interval.high:.4f}",
         *deciding_flights_lines,
-        *(f"  {line}" for line in flown_lines(summary.conditions)),
+        *(f"  {line}" for line in flown_condition_lines(summary.conditions)),
         f"  Varied around these conditions: {', '.join(varied) or 'nothing'}; the same in every flight:"
         f" {', '.join(constant) or 'nothing else'}",
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),

@@ -51,7 +51,7 @@ def battery(args: argparse.Namespace) -> int:
 
     The exit code is 0 if the aircraft's battery is enough, 4 if it is too small, and 3 if this is not known.
     """
-    from logs.verdict.conditions import flown_lines
+    from logs.verdict.conditions import flown_condition_lines
     from planfly.api import campaigns
     from planfly.campaigns.battery_text import answer_line, battery_lines
 
@@ -59,7 +59,7 @@ def battery(args: argparse.Namespace) -> int:
     ok = result.is_enough
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"battery   {colour_text(answer_line(result), 'warning' if ok is None else 'good' if ok else 'bad')}")
-    for text in (*flown_lines(result.base.conditions()), *battery_lines(result)):
+    for text in (*flown_condition_lines(result.base.conditions()), *battery_lines(result)):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")

@@ -73,14 +73,14 @@ def ground_risk(args: argparse.Namespace) -> int:
 
     The exit code is 0 if the class is known, and 3 if the population is not.
     """
-    from logs.verdict.conditions import flown_lines
+    from logs.verdict.conditions import flown_condition_lines
     from planfly.api import ground_risk as ground_risk_api
     from planfly.campaigns.ground_risk_text import answer_line, risk_lines
 
     result = ground_risk_api.ground_risk(**given_options(args))
     code = FLYABLE if result.is_judged else INCOMPLETE
     print(f"risk      {colour_text(answer_line(result), 'good' if result.is_judged else 'warning')}")
-    for text in (*flown_lines(result.base.conditions()), *risk_lines(result)):
+    for text in (*flown_condition_lines(result.base.conditions()), *risk_lines(result)):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")

@@ -74,14 +74,14 @@ def link(args: argparse.Namespace) -> int:
 
     The exit code is 0 if the link is kept, 4 if it is lost for too long, and 3 if this is not known.
     """
-    from logs.verdict.conditions import flown_lines, judging_conditions
+    from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import linking
 
     result = linking.link(**given_options(args))
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
-    for text in (*flown_lines(judging_conditions(result.setup)), *result.outage_lines, *result.return_lines):
+    for text in (*flown_condition_lines(judging_conditions(result.setup)), *result.outage_lines, *result.return_lines):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")
@@ -92,7 +92,7 @@ def link(args: argparse.Namespace) -> int:
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
     """Return the answer of ``planfly link`` for --json."""
     from logs.verdict.conditions import judging_conditions
-    from logs.verdict.returns.returns_text import headline
+    from logs.verdict.returns.returns_text import returns_headline
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry
 
     outages = () if result.along is None else result.along.outages
@@ -115,6 +115,6 @@ def _json_answer(source: str, result: "LinkResult", code: int) -> object:
         facts={fact.what: fact.value for fact in result.finding.facts},
         where=result.where,
         outages=entries,
-        returns=None if result.returns is None else headline(result.returns),
+        returns=None if result.returns is None else returns_headline(result.returns),
         files=[str(path) for path in result.files],
     )

@@ -81,7 +81,7 @@ def returns(args: argparse.Namespace) -> int:
 
     The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if some are undecided.
     """
-    from logs.verdict.conditions import flown_lines, judging_conditions
+    from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import returning
 
     result = returning.returns(**given_options(args))
@@ -89,7 +89,7 @@ def returns(args: argparse.Namespace) -> int:
     print(
         f"returns   {colour_text(result.headline, 'good' if result.safe else 'warning' if result.undecided else 'bad')}"
     )
-    for text in flown_lines(judging_conditions(result.setup)):
+    for text in flown_condition_lines(judging_conditions(result.setup)):
         print(f"  {text}")
     for text in result.cause_lines:
         print(f"  {text}")

@@ -64,7 +64,7 @@ def survey(args: argparse.Namespace) -> int:
 
     The exit code is 4 if too much of a photo line is lost, otherwise that of the verdict on the flight.
     """
-    from logs.verdict.conditions import flown_lines, judging_conditions
+    from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import surveying
 
     result = surveying.survey(**given_options(args))
@@ -73,7 +73,7 @@ def survey(args: argparse.Namespace) -> int:
         code = NOT_FLYABLE
     print(f"survey    {colour_text(result.headline, 'bad' if result.lost else 'good' if result.usable else 'warning')}")
     print(f"flight    {result.verdict.headline}")
-    for text in flown_lines(judging_conditions(result.setup)):
+    for text in flown_condition_lines(judging_conditions(result.setup)):
         print(f"  {text}")
     for text in result.survey_lines:
         print(f"  {text}")

@@ -52,7 +52,7 @@ def window(args: argparse.Namespace) -> int:
     The exit code is 0 if the requested departure is open (or any departure if none is requested), 4 if not, and 3 if it
     is not judged in full.
     """
-    from logs.verdict.conditions import flown_lines
+    from logs.verdict.conditions import flown_condition_lines
     from planfly.api import finding_windows
     from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
 
@@ -60,7 +60,7 @@ def window(args: argparse.Namespace) -> int:
     go = result.is_go
     code = INCOMPLETE if go is None else FLYABLE if go else NOT_FLYABLE
     print(f"window    {colour_text(answer_line(result), 'warning' if go is None else 'good' if go else 'bad')}")
-    for text in (*unjudged_lines(result), *flown_lines(result.base.conditions()), *window_lines(result)):
+    for text in (*unjudged_lines(result), *flown_condition_lines(result.base.conditions()), *window_lines(result)):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")

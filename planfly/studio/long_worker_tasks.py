@@ -11,7 +11,7 @@ from typing import Any
 from flight.mission.items import Mission
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import return_starts
-from logs.verdict.returns.returns_text import headline, point_of_no_return_text, range_text
+from logs.verdict.returns.returns_text import point_of_no_return_text, return_range_text, returns_headline
 from logs.verdict.rule_words import rule_word
 from planfly.campaigns.campaign_base import CampaignBase, campaign_of_setup
 from planfly.campaigns.dispersions import default_dispersions
@@ -65,12 +65,12 @@ def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
         world, starts, interval, advance=lambda done, total: advance(0.5 + 0.5 * done / max(1.0, total), 1.0, remark)
     )
     lines = [
-        range_text(return_range, judged_returns, context.scenario)
+        return_range_text(return_range, judged_returns, context.scenario)
         for return_range in judged_returns.ranges[:_MAX_LISTED_RANGES]
     ]
     return {
         "state": "ok" if judged_returns.safe else "open" if judged_returns.undecided else "fail",
-        "headline": headline(judged_returns),
+        "headline": returns_headline(judged_returns),
         "lines": [*lines, *filter(None, [point_of_no_return_text(judged_returns)])],
     }
 

@@ -77,7 +77,9 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
     text += "not judged" if is_line_unknown(measure) else f"{100.0 * measure.usable:5.1f} % can be used"
     loss_text = unusable_parts_text(measure)
     photos_text = (
-        f"; {measure.missed_photos} of {count_text(measure.photos, 'photo')} missed" if measure.missed_photos else ""
+        f"; {measure.missed_photo_count} of {count_text(measure.planned_photo_count, 'photo')} missed"
+        if measure.missed_photo_count
+        else ""
     )
     return f"{text}{': ' if loss_text else ''}{loss_text}{photos_text}"
 
@@ -167,7 +169,7 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
     >>> count_line_photos([None])
     0
     """
-    return sum(0 if measure is None else measure.taken_photos for measure in lines)
+    return sum(0 if measure is None else measure.taken_photo_count for measure in lines)
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:

@@ -7,9 +7,9 @@ from pydantic.dataclasses import dataclass
 
 from logs.verdict.conditions import Conditions
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
-from logs.verdict.returns.judge_glides import MARGIN
+from logs.verdict.returns.judge_glides import GLIDE_CLEARANCE_M
 from logs.verdict.returns.judge_returns import ReturnRange, SimulatedReturn
-from logs.verdict.returns.returns_text import headline, range_text
+from logs.verdict.returns.returns_text import return_range_text, returns_headline
 from planfly.api.returning import RemedyTrial, ReturnsResult
 from planfly.terminal.verdict_answers import STRICT
 from world.frames import to_geo
@@ -232,7 +232,7 @@ def suggestion_entry(result: ReturnsResult, trial: RemedyTrial) -> ReturnSuggest
         rally=rally,
         safe=trial.returns.count("safe"),
         unsafe=len(trial.returns.each) - trial.returns.count("safe"),
-        headline=headline(trial.returns),
+        headline=returns_headline(trial.returns),
     )
 
 
@@ -304,13 +304,13 @@ def glides_entry(result: ReturnsResult) -> GlidesEntry:
         headline=glides_headline(glides),
         not_judged=glides.not_judged,
         airspeed_mps=glides.airspeed,
-        margin_m=MARGIN,
+        margin_m=GLIDE_CLEARANCE_M,
         cell_m=_round_to_tenths(glides.cell),
         sites=[
             GlideSiteEntry(kind=site.kind, number=site.number, east_m=round(site.east, 1), north_m=round(site.north, 1))
             for site in glides.sites
         ],
-        own_arrives=glides.arrivals,
+        own_arrives=glides.arrival_count,
         home=glides.count("home"),
         site=glides.count("site"),
         flat=glides.count("flat"),
@@ -339,5 +339,5 @@ def return_range_entry(result: ReturnsResult, return_range: ReturnRange) -> Retu
         zone=result.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
         energy_wh=round_to_tenths(worst_return.energy),
         left_wh=round_to_tenths(worst_return.energy_left),
-        text=range_text(return_range, result.returns, scenario),
+        text=return_range_text(return_range, result.returns, scenario),
     )

@@ -152,8 +152,8 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
         dark=round(measure.camera_off, 4),
         unknown=round(measure.unknown, 4),
         lost_m=[(round(start, 1), round(end, 1)) for start, end in measure.lost_spans],
-        photos=measure.photos,
-        missed=measure.missed_photos,
+        photos=measure.planned_photo_count,
+        missed=measure.missed_photo_count,
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.conditions import flown_lines
+from logs.verdict.conditions import flown_condition_lines
 from logs.verdict.presentation import RuleFindings, finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
@@ -93,13 +93,13 @@ def _rule_summary(rule: RuleFindings) -> str:
 
     If no finding of the rule was judged, the text states the reason.
     """
-    if not rule.judged:
+    if not rule.judged_count:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
         # Of several such findings the first stands for all.
         return "; ".join(
-            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_otherwise[:1])]
+            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_beyond_limit[:1])]
         )
     value, limit = closest.compared_texts()
     if not value or not limit:
@@ -146,6 +146,6 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         remedy = f"; {other_lines[0]}" if other_lines and not verdict.flyable else ""
         lines.append(f"{name}: " + colour_text(first, STATE_STYLES[verdict.state]) + remedy)
         if verdict.conditions is not None:
-            condition_texts = flown_lines(verdict.conditions)
+            condition_texts = flown_condition_lines(verdict.conditions)
             lines += [f"  {line}" for line in condition_texts]
     return lines

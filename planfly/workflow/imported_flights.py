@@ -28,7 +28,7 @@ from logs.importers.imported_flight import LoggedFlight, make_flight, make_track
 from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
-from logs.verdict.imported.judge_imported_flight import missing_text
+from logs.verdict.imported.judge_imported_flight import missing_items_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
@@ -178,7 +178,7 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
         raise LogError(f"{path}: contains no mission; name the planned mission with `plan`", file=path)
     logged = flight.mission
     if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
-        problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]
+        problems = [missing_items_text(logged.missing), *logged.mission.warnings[:1]]
         problems.append("name the planned mission with `plan`")
         raise LogError(f"{path}: {'; '.join(problems)}", file=path)
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""

@@ -21,7 +21,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, draw
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, return_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
 from planfly.runtime.stages import Advance, stage
@@ -400,4 +400,4 @@ def return_summary(
         return ReturnSummary(f"not judged: {error}")
     is_replaced = world.stands_in and not world.uses_other_autopilot
     replacement_text = f" (simulated with ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
-    return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)
+    return ReturnSummary(returns_headline(returns) + replacement_text, world, starts, returns)

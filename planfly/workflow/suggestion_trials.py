@@ -434,7 +434,7 @@ class SuggestionTrials:
                     smaller = tuple(
                         replace(
                             suggestion[-1],
-                            place=self.judged.requirements.waypoint(items.index(move.item)),
+                            place=self.judged.requirements.waypoint_place(items.index(move.item)),
                             wanted=round(abs(move.up), 2),
                             moves=(move,),
                         )

@@ -30,9 +30,9 @@ class FlownLegs:
 
     stretch: times of the stretch, and how it ended.
     first, last: waypoints between which the stretch was flown.
-    partial: True if the last waypoint was not reached.
-    requirements: requirements of only the route between these waypoints.
-    aligned: rows flown on that route.
+    partial: True if waypoint `last` was not reached.
+    requirements: requirements of the part of the route between these waypoints.
+    aligned: track of the stretch, aligned with this part.
     """
 
     stretch: MissionStretch
@@ -44,11 +44,10 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs flown in a stretch of the log that follows the mission; return None without any.
+    """Find the legs flown in a stretch of the log that follows the mission; return None if there are none.
 
-    A stretch has no legs if it passed fewer than two waypoints, or has fewer than two rows.  The first leg starts at
-    the first waypoint that was passed.  The last leg ends at the last waypoint that was passed; if the log continues
-    beyond it, the next leg is added as a partly flown leg.
+    The first leg starts at the first waypoint that was passed, and the last leg ends at the last one.  If the log
+    continues for more than `PARTIAL_LEG_MIN_S` beyond it, the next leg is added as a partly flown leg.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -92,7 +91,7 @@ def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
 
 
 def stretch_end_text(stretch: MissionStretch) -> str:
-    """Describe how a stretch ended."""
+    """Describe how a stretch ended: by a change of mode, the end of the flight, or the end of the log."""
     if stretch.ended == "mode":
         return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
     if stretch.ended == "landed":
@@ -105,9 +104,12 @@ def _earliest_lap(
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
     """Align a track with the earliest matching laps of a repeated route.
 
-    Return the aligned track and the indices of the passed waypoints.
     All laps have the same waypoints, so a flight that ended within a lap could otherwise be matched to any later lap.
-    Return `aligned` and `waypoint_indices` unchanged if no shorter route matches the track.
+
+    rows: track of the stretch.
+    aligned, waypoint_indices: this track aligned with the whole route, and the waypoints that it passes.
+
+    Return the new aligned track and its waypoints, or both arguments unchanged if no shorter route matches the track.
     """
     items, last = setup.route.items, int(waypoint_indices[-1])
     if len(waypoint_indices) == last - waypoint_indices[0] + 1:
@@ -133,8 +135,9 @@ def rows_between(track: Track, start: float, end: float) -> Track:
 def identified_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
     """Return the indices, in order, of the waypoints that the track passes closely enough to identify.
 
-    The track must come within `CAPTURE_RADIUS_M` of the place where the planned path passes the waypoint.  At the start
-    and the end of the track it must come closer: within the fly-by offset plus a tolerance, or within the corridor.
+    The track must come within `CAPTURE_RADIUS_M` of the place where the planned path passes the waypoint.  If its
+    nearest row is its first or last row, it must come closer: within the fly-by offset plus a tolerance, or within the
+    corridor, whichever is wider.
     """
     edge_distance = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
     is_inner = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
@@ -143,7 +146,7 @@ def identified_waypoints(requirements: RouteRequirements, aligned: AlignedTrack)
 
 
 # ----------------------------------------------------------------------
-# Check that the flight followed this plan at all: one line that gives the reason, instead of a fault for every leg.
+# Check that the flight followed this plan at all.  If not, one line gives the reason instead of a fault for every leg.
 
 # Number of waypoints that are named in the order in which they were passed.
 _MAX_NAMED = 6
@@ -153,19 +156,19 @@ _MAX_NAMED = 6
 class PlanMismatch:
     """Reason why a flight did not follow a plan.
 
-    kind: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
+    reason: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
     distance: for "place", the minimum distance of the flight from a waypoint, m.
     order: for "order", the items of the first waypoints in the order in which they were passed.
     """
 
-    kind: str
+    reason: str
     distance: float = 0.0
     order: tuple[int, ...] = ()
 
     @property
     def text(self) -> str:
         """Text of the reason."""
-        if self.kind == "place":
+        if self.reason == "place":
             distance_text = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
             return f"the flight is elsewhere, at least {distance_text} from every waypoint"
         return f"the flight passed its items in another order: {', '.join(map(str, self.order))}, ..."

@@ -46,7 +46,7 @@ _DATUM_TEXTS: dict[VerticalDatum, str] = {
 _MAX_LISTED_JUMPS = 4
 
 
-def imported_lines(
+def imported_summary_lines(
     findings: Sequence[Finding],
     setup: FlightSetup,
     own_answer: LevelAnswer,
@@ -103,7 +103,7 @@ def imported_lines(
     lines += [line] if (line := corridor_line(setup, findings)) else []
     if imported_log.mission:
         lines.append(f"Mission: {imported_log.mission}")
-    lines.append(f"Heights: {heights_text(imported_log)}")
+    lines.append(f"Heights: {altitude_source_text(imported_log)}")
     wind = setup.scenario.wind
     if imported_log.wind:
         lines.append(f"Wind: {wind.speed:.1f} m/s on average, {imported_log.wind}")
@@ -115,11 +115,12 @@ def imported_lines(
     return tuple(lines)
 
 
-def heights_text(imported_log: ImportedLog) -> str:
-    """Describe a log's altitude source, its datum, and the offsets of other altitudes at the start.
+def altitude_source_text(imported_log: ImportedLog) -> str:
+    """Describe the source and the datum of a log's altitudes, and how far other altitudes differ at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
-    >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
+    >>> heights = Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))
+    >>> altitude_source_text(ImportedLog("a.BIN", "", "", heights=heights))
     'from POS, above mean sea level, according to the log; other heights differ at the start: GPS.Alt by -0.1 m'
     """
     offsets = ", ".join(f"{height.name} by {height.offset:+.1f} m" for height in imported_log.heights.offsets)
@@ -155,14 +156,14 @@ def row_faults_text(faults: RowFaults, gaps: int) -> str:
 _MAX_LISTED_RANGES = 6
 
 
-def missing_text(missing: MissingItems) -> str:
+def missing_items_text(missing: MissingItems) -> str:
     """Describe which part of a mission is not judged, and which items the log lacks.
 
-    >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
+    >>> missing_items_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
     'not judged beyond item 6: items 7 to 13 of 14 are ignored or not in the log'
-    >>> missing_text(MissingItems((1, 5), total=0, first=2, last=4, end=9))
+    >>> missing_items_text(MissingItems((1, 5), total=0, first=2, last=4, end=9))
     'not judged before item 2 and beyond item 4: items 1 and 5 are ignored or not in the log'
-    >>> missing_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
+    >>> missing_items_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
     'not judged: items 1 to 3 of 4 are ignored or not in the log'
     """
     ranges: list[list[int]] = []
@@ -246,7 +247,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     # Among the findings of all stretches for a rule, place and check, a failure replaces a pass, and a pass an unjudged
     # finding.
     merged: dict[tuple[str, Place, str], Finding] = {}
-    for finding in (finding for legs in flown_stretches for finding in _stretch_findings(setup, legs)):
+    for finding in (finding for legs in flown_stretches for finding in _judge_stretch(setup, legs)):
         key = (finding.rule, finding.place, finding.check)
         if key not in merged or _merge_precedence(finding) > _merge_precedence(merged[key]):
             merged[key] = finding
@@ -260,7 +261,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     unjudged_texts = []
     unended = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
     if imported_log.missing is not None:
-        unjudged_texts.append(missing_text(imported_log.missing))
+        unjudged_texts.append(missing_items_text(imported_log.missing))
     elif unended:
         unjudged_texts.append(f"not judged from end to end: {unended[0]}")
     pauses = []
@@ -287,7 +288,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         setup.autopilot.answer_name, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
     )
     conditions = judging_conditions(setup)
-    lines = imported_lines(findings, setup, own_answer, flown_stretches, conditions)
+    lines = imported_summary_lines(findings, setup, own_answer, flown_stretches, conditions)
     return Verdict(
         findings,
         flyable,
@@ -304,12 +305,15 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     )
 
 
-def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
-    """Judge one stretch; its findings number legs and waypoints as in the whole route."""
+def _judge_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
+    """Judge one stretch of the log; the findings number legs and waypoints as in the whole route.
+
+    legs: legs that were flown in the stretch.
+    """
     findings = []
     for finding in run_rules(legs.requirements, legs.aligned):
         place, index, log_needs = finding.place, finding.place.index, RULES[finding.rule].log
-        checked = _unjudge_without_data(setup, legs, finding)
+        checked = _mark_unjudged_without_data(setup, legs, finding)
         # Not judged, although passed: a leg with a gap in the log, and a waypoint, for rules that need its rows.
         is_leg, is_waypoint = place.kind == "leg", place.kind == "waypoint"
         if checked.ok is True and index is not None and (is_leg or (is_waypoint and log_needs.needs_no_gap)):
@@ -347,8 +351,8 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     return [*findings, *findings_without_data]
 
 
-def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
-    """Return the finding, marked as not judged if the log lacks data that its rule needs."""
+def _mark_unjudged_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
+    """Return the finding, marked as not judged if its rule needs data or an aircraft that the log does not provide."""
     imported_log = setup.imported_log
     if imported_log is None:
         return finding
@@ -397,7 +401,7 @@ def _merge_precedence(finding: Finding) -> int:
 
 
 def _leg_ends(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """Return the end time of each leg except the last, s; inf from the first unreached leg on.
+    """Return the end time of each leg of the whole route except the last, s; inf from the first unreached leg on.
 
     The times never decrease.
     """

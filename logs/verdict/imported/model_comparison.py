@@ -106,7 +106,7 @@ class Reflight:
     distance: distances along the route's legs at which the flights are compared, m, (n,).
     ends: distance along the route at which each leg ends, m, (legs,).
     flown, model: profiles of the imported and the simulated flight.
-    first: number of the first compared leg in the whole route.
+    first: index of the first compared leg in the whole route.
     legs, turns, spreads: comparisons of the legs, of the turns, and of each quantity over all points.
     stands_in: True if the log's aircraft is unknown, and another aircraft's model flew.
     """
@@ -170,7 +170,7 @@ def compare_with_model(
         _turn_pair(stretch_legs.first + k, float(stretch_legs.requirements.turns[k]), *turn_measures)
         for k, turn_measures in enumerate(zip(*measures, strict=True), 1)
     )
-    # The differences between both flights by quantity, if both know it at the same points.
+    # The differences between both flights in each quantity, at the points where both flights have it.
     (flown_profile, model_profile), spreads = profiles, []
     for name, unit, factor in (
         ("cross_track", "m", 1.0),
@@ -248,13 +248,13 @@ def _flight_profile(
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     """Compare one leg of the flown profile with the same leg of the simulated profile.
 
-    leg: number of the leg in the whole route.
-    rows: range of the profiles' points on the leg.
+    leg: index of the leg in the whole route.
+    rows: range of the profiles' points that lie on the leg.
     profiles: profiles of the flown and of the simulated flight.
     """
 
     def pair(name: str, reduce: Callable[[Floats], float]) -> tuple[float, float]:
-        """Return one quantity of the flown and of the simulated leg, reduced to one number; NaN if it is unknown."""
+        """Return one quantity of the flown and the simulated leg, each reduced to one number; NaN if unknown."""
         columns = [getattr(profile, name)[rows] for profile in profiles]
         flown_values, model_values = (column[np.isfinite(column)] for column in columns)
         return (
@@ -280,12 +280,13 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
 def _turn_pair(waypoint: int, planned_turn: float, flown: TurnMeasure, model: TurnMeasure) -> TurnPair:
     """Compare the flown and the simulated turn at a waypoint.
 
-    waypoint: number of the waypoint in the whole route.
+    waypoint: index of the waypoint in the whole route.
     planned_turn: planned course change, rad.
+    flown, model: measures of the turn in the imported and in the simulated flight.
     """
 
     def value_pair(name: str, factor: float = 1.0) -> tuple[float, float]:
-        """Return one quantity of both turns times a factor, with NaN instead of None."""
+        """Return one quantity of the flown and the simulated turn, each times a factor; NaN if not measured."""
         values = (getattr(flown, name), getattr(model, name))
         flown_value, model_value = (math.nan if value is None else value * factor for value in values)
         return flown_value, model_value

@@ -1,4 +1,4 @@
-"""Decide when a waypoint is reached, and how far from the legs a flight may be."""
+"""Compute within which distance a waypoint counts as reached, and how far from its legs a flight may be."""
 
 import math
 from dataclasses import replace
@@ -32,11 +32,11 @@ from world.arrays import Floats
 
 
 def acceptance_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
-    """Return the distance within which a waypoint is reached, m, and its source.
+    """Return the distance within which a waypoint is reached, m, and the source of this limit.
 
-    The sources are "mission" (the acceptance radius of the item), "autopilot" (the acceptance radius of the autopilot),
-    and for an autopilot that follows the path "fly-over" and "fly-by path" (the distance at which the path passes, and
-    a margin).
+    The source is "mission" for the item's own acceptance radius, and "autopilot" for the autopilot's radius.  For an
+    autopilot that follows the path, it is "fly-over" or "fly-by path"; the limit is then the distance at which the path
+    passes the waypoint plus `WAYPOINT_PASS_MARGIN_M`.
 
     ArduPlane turns to the next leg at WP_RADIUS before a corner of 90 degrees or more, and at a fraction of WP_RADIUS
     before a gentler corner. The full WP_RADIUS is allowed at the mission's end and where a return to launch begins.
@@ -58,8 +58,8 @@ def position_error(setup: FlightSetup) -> float:
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
-def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
-    """Return how far the turns at a leg's start and end deviate from the legs, m, (2,).
+def turn_deviations(requirements: RouteRequirements, leg: int) -> Floats:
+    """Return the largest distance of the planned turns at a leg's start and end from the legs, m, (2,).
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
@@ -82,7 +82,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     if requirements.setup.scenario.limits.corridor_m is not None:
         return half_width, "scenario"
     ends = slice(leg, leg + 2)
-    depths = corner_depths(requirements, leg)
+    depths = turn_deviations(requirements, leg)
     imported_log = requirements.setup.imported_log
     radius_is_known = imported_log is None or imported_log.aircraft_known
     if radius_is_known and not requirements.setup.autopilot.turns.follows_path:
@@ -130,7 +130,7 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 # ----------------------------------------------------------------------
-# Corners and steps that no aircraft has to fly as drawn, because a path without them is practically the same.
+# Corners and altitude steps that need not be flown as drawn, because a path without them is practically the same.
 #
 # A sidestep of a few metres has two right angles without room for a turn, but a straight path passes within metres of
 # both.  A step of a few metres in altitude is a vertical leg, but a climb that begins a little early misses it only by
@@ -138,11 +138,11 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> float | None:
-    """Return how far a shortcut past a waypoint passes from the waypoints that it omits, m.
+    """Return the distance of a waypoint from a shortcut past it, m, or None if no shortcut is flyable.
 
-    An aircraft that cannot fly the corner at the waypoint as drawn can fly the shortcut instead.  The shortcut omits
-    the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is that of the farthest of them.
-    Return None if no shortcut is flyable.
+    An aircraft that cannot fly the corner at the waypoint as drawn can fly the shortcut instead: a straight leg that
+    omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.  If it omits several waypoints, the
+    distance of the farthest one is returned.  Shortcuts that omit fewer waypoints are tried first.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, waypoint - count + 1), min(waypoint, requirements.legs - count) + 1):
@@ -155,10 +155,10 @@ def negligible_kink_distance(requirements: RouteRequirements, waypoint: int) -> 
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return the largest distance of waypoints `first` to `last` from a straight leg instead of them, m.
+    """Return the largest distance of waypoints `first` to `last` from the straight leg that omits them, m.
 
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
-    if the path is vertical, or if there is no room for the turns at its ends.
+    if the leg has no length, or if there is no room for the turns at its ends.
     """
     start, *omitted, end = requirements.points[first - 1 : last + 2, :2].tolist()
     if start == end:
@@ -173,14 +173,14 @@ def shortcut_distance(requirements: RouteRequirements, first: int, last: int) ->
     if (
         distance > KINK_FRACTION * requirements.setup.corridor
         or requirements.setup.route.arc_radii[first : last + 1].any()
-        or not _gap_has_room(requirements, first, last)
+        or not _shortcut_fits(requirements, first, last)
     ):
         return None
     return distance
 
 
-def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
-    """Return True if the route without waypoints `first` to `last` has room for the turns around the gap."""
+def _shortcut_fits(requirements: RouteRequirements, first: int, last: int) -> bool:
+    """Return True if the turns at both ends of the leg that omits waypoints `first` to `last` fit the route."""
     previous_corner, next_corner = first - 1, last + 1
     if not (
         _turn_fits_alone(requirements, previous_corner - 1, previous_corner, next_corner)
@@ -209,7 +209,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
     """Return True if the turn at `corner` fits the straight legs from `before` and to `after`.
 
     Neighbouring turns are ignored.  This necessary condition is ten times faster than the full check of
-    `_gap_has_room`.  The first and the last waypoint of the route have no turn.
+    `_shortcut_fits`.  The first and the last waypoint of the route have no turn.
     before, corner, after: waypoints.
     """
     route = requirements.setup.route
@@ -235,12 +235,11 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
     return abs(math.remainder(course_out - course_in, 2.0 * math.pi)) <= limit + PLAN_TOLERANCE_RAD
 
 
-def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the altitude change of a too steep leg, m, if the change is negligible; otherwise None.
+def negligible_step_height(requirements: RouteRequirements, leg: int) -> float | None:
+    """Return the altitude change of a leg that is too steep, m, if the change is negligible; otherwise None.
 
-    The change is positive for a climb and for a descent.
-    A change up to `NEGLIGIBLE_STEP_M` is negligible.  If a sequence of legs around the leg is too steep overall, the
-    altitude change of the whole sequence counts.
+    The returned change is positive, even in a descent.  A change of up to `NEGLIGIBLE_STEP_M` is negligible.  If a
+    sequence of legs around the leg is too steep overall, the altitude change of the whole sequence is used.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
@@ -256,14 +255,14 @@ def step_height(requirements: RouteRequirements, leg: int) -> float | None:
 
 
 def slope_with_next_leg(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the slope of a vertical leg and the next leg together, rad, if the autopilot flies both at once.
-
-    Return None if the leg is judged as drawn.  The slope is positive for a climb.
+    """Return the slope of a vertical leg and the next leg flown as one, rad, positive for a climb.
 
     Where an item repeats the position of the item before it, ArduPlane passes both at once, whatever their altitudes
     (`verify_nav_wp`).  The aircraft then climbs or descends along the next leg, below or above the line of that leg.
-    PX4 passes the second item only within its altitude tolerance, and otherwise circles.  The first leg, a loiter, and
-    a change of altitude that is too steep for the next leg are judged as drawn.
+    PX4 passes the second item only within its altitude tolerance, and otherwise circles.
+
+    Return None if the leg is judged as drawn: a leg that is not vertical, the first or last leg, a loiter, a leg of an
+    autopilot that follows the path or would circle, and a change of altitude that is too steep for the next leg.
     """
     autopilot, points, next_leg = requirements.setup.autopilot, requirements.points, leg + 1
     if (

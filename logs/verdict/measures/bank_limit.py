@@ -1,4 +1,4 @@
-"""Name the bank limit of a flight, and who sets it."""
+"""Describe the bank limit of a flight and its source."""
 
 import math
 
@@ -11,8 +11,8 @@ _SAME_BANK_RAD = 1e-6
 def bank_limit_text(setup: FlightSetup) -> str:
     """Return a text on a setup's bank limit and its source, such as "the aircraft's bank limit of 29°".
 
-    The source is the aircraft, the autopilot or the scenario, whichever has this limit.  If none has it, the text names
-    no source: "a bank limit of 29°".
+    The source is the aircraft, the autopilot or the scenario: the first one that has this limit.  If none has it, the
+    text names no source: "a bank limit of 29°".  A guessed limit of the aircraft is marked as a guess.
 
     >>> from logs.recording.example_log import example_log
     >>> bank_limit_text(example_log().setup)

@@ -34,9 +34,9 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the ground, missiles, zones and area edges that a flight around a center may meet.
+    """Describe the hazards within reach of a flight around a center: ground, missiles, zones and the area's edges.
 
-    Return [] if there are none.
+    Return one text for each hazard; [] if there are none.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
@@ -115,9 +115,9 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _zone_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the zones that a flight within `reach` (m) of a center may violate.
+    """Describe the zones that a flight within `reach` (m) of a center may violate, or whose ground is unknown.
 
-    The zones are checked along rings at several altitudes between two limits (m AMSL).
+    The zones are checked along rings at several altitudes from `min_altitude` to `max_altitude` (m AMSL).
     center: east and north, m, (2,).
     """
     airspace = requirements.airspace

@@ -1,4 +1,4 @@
-"""Measure legs that follow the ground: the altitude that they demand, and the slopes of this demand."""
+"""Measure legs that follow the ground: the demanded altitude along the leg, and its slope."""
 
 import math
 from typing import NamedTuple
@@ -32,9 +32,9 @@ def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def mean_ground_slope(requirements: RouteRequirements, leg: int) -> float:
-    """Return the mean slope of the ground under a leg that follows it, rad; NaN for any other leg.
+    """Return the slope from the ground at a leg's start to the ground at its end, rad.
 
-    The slope is also NaN for unknown ground.
+    The slope is NaN for a leg that does not follow the ground, and for unknown ground.
     """
     terrain = requirements.setup.scenario.terrain
     if terrain is None or not follows_ground(requirements, leg):
@@ -65,9 +65,10 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
 
 
 def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) -> float:
-    """Return the altitude error of a position on a leg, m, positive above.
+    """Return how far a position is above the altitude that a leg demands there, m, negative below.
 
-    The demanded altitude lies on the straight line of the leg, or above the ground on a leg that follows the ground.
+    The demanded altitude lies on the straight line between the leg's waypoints.  On a leg that follows the ground, it
+    is the altitude from `demanded_altitudes`, and the error is NaN over unknown ground.
 
     position: east, north and up, m, (3,).
     """
@@ -79,11 +80,12 @@ def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) 
 
 
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
-    """Find the part of a ground-following leg that rises most above a climb at the aircraft's limit.
+    """Find the part of a ground-following leg on which an aircraft that climbs at a limit falls behind the most.
 
     The ground is sampled in steps of `GROUND_STEP_M`, like ArduPlane's terrain data.  Return None if no part of the leg
-    exceeds the limit, or if the ground or the limit is unknown.
-    limit: limit of the climb slope, rad.
+    is steeper than the limit, or if the ground or the limit is unknown.
+
+    limit: steepest possible climb, rad.
     """
     start = requirements.points[leg, :2]
     unit = requirements.leg_unit(leg)

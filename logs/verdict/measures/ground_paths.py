@@ -48,7 +48,7 @@ class GroundPath(NamedTuple):
 
 
 def track_path(track: Track) -> GroundPath:
-    """Return the positions of a flown track with their horizontal distances along the track."""
+    """Return a flown track as a path: its positions, and their horizontal distances along the track."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
     return GroundPath(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
@@ -63,7 +63,7 @@ def straight_path(start: Sequence[float] | Floats, course: float, profile: Profi
 
 
 def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float]:
-    """Return a path's minimum height above ground, and where it occurs as a distance along the path, m.
+    """Return a path's minimum height above ground, m, and the distance along the path at which it occurs, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
     """
@@ -78,11 +78,11 @@ def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float
     return float(heights[k]), float(distances[k] + clearances[k][1] * (distances[k + 1] - distances[k]))
 
 
-def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> str:
-    """Return the name of a missile sphere or zone that a path enters, or "" if it enters none.
+def hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> str:
+    """Return the name of a missile sphere or zone that a path violates, or "" if it violates none.
 
-    If it enters several, the missile with the lowest number is named, or else the zone with the lowest number.  Ignore
-    zones that contain the path's start, and inclusion zones with a floor.
+    If it violates several, the missile with the lowest number is named, or else the zone with the lowest number.  Zones
+    that the path violates from its start, and inclusion zones with a floor, are ignored.
     """
     scenario, airspace = requirements.setup.scenario, requirements.airspace
     if not scenario.external:
@@ -111,7 +111,7 @@ def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> s
 def has_ground_paths(requirements: RouteRequirements) -> bool:
     """Return True if the paths from and to the ground can be judged.
 
-    This needs terrain data, a mission that was not imported from a log, and, for a plan, planned ground phases.
+    This needs terrain data and a flight that was not imported, and for a plan made by planfly, planned ground phases.
     """
     setup = requirements.setup
     has_ground_phases = setup.plan is None or setup.plan.procedures is not None
@@ -119,7 +119,10 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
 
 
 def takeoff_item(setup: FlightSetup) -> tuple[int, MissionItem | None]:
-    """Return the first waypoint that has a mission item, and this item if it is a take-off, else None."""
+    """Return the index of the first waypoint with a mission item, and this item if it is a take-off, else None.
+
+    The index is 0 if no waypoint has an item.
+    """
     route = setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in setup.mission.items if item.seq == int(route.items[first])]
@@ -140,6 +143,8 @@ def landing_item(setup: FlightSetup) -> tuple[int, MissionItem] | None:
 
 def first_landing_leg(setup: FlightSetup, landing: int, final_leg: int) -> int:
     """Return the first leg of a landing: from DO_LAND_START, or else the leg before the final approach.
+
+    The landing begins with the leg that leads to the first waypoint after the last DO_LAND_START before the landing.
 
     landing: number of the landing's item.
     final_leg: leg of the final approach.

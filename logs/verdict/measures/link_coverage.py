@@ -1,4 +1,4 @@
-"""Map the margin of a radio link at the height of a flight, over the ground around it."""
+"""Map the margin of a radio link around a flight, for an aircraft at the flight's height or altitude."""
 
 from dataclasses import dataclass
 
@@ -50,7 +50,7 @@ class LinkCoverage:
 
 
 def flight_height(terrain: Terrain, positions: Floats) -> FlightHeight:
-    """Return the median altitude of a path, or its median height above ground if this varies less.
+    """Return the median altitude of a path, or its median height above ground if the height varies less.
 
     positions: points of the path, m, (t, 3).
 

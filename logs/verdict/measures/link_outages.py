@@ -52,7 +52,7 @@ class LinkAlongPath:
         return bool(np.isfinite(self.points.margin).all())
 
     @property
-    def worst(self) -> int:
+    def worst_point(self) -> int:
         """Index of the point with the smallest known margin; -1 if no margin is known."""
         margin = self.points.margin
         return int(np.nanargmin(margin)) if np.isfinite(margin).any() else -1
@@ -69,9 +69,10 @@ class LinkAlongPath:
 
 
 def station_antenna(setup: FlightSetup, link: RadioLink, terrain: Terrain) -> Floats | None:
-    """Return the position of the ground station's antenna, m, (3,), by default at the mission's home.
+    """Return the position of the ground station's antenna, m, (3,).
 
-    Return None if the station has neither a position nor a home, or if the ground at this position is unknown.
+    A station without a stated position stands at the mission's home.  Return None if there is no home either, or if the
+    ground at the position is unknown.
     """
     position = link.station
     if position is None:
@@ -86,7 +87,9 @@ def station_antenna(setup: FlightSetup, link: RadioLink, terrain: Terrain) -> Fl
 def link_along_path(
     link: RadioLink, terrain: Terrain, antenna: Floats, time: Floats, positions: Floats
 ) -> LinkAlongPath:
-    """Compute the quality of the radio link about once a second along a path, and its outages.
+    """Compute the quality of the radio link along a path, about once a second, and its outages.
+
+    Points with a non-finite time or position are ignored.
 
     antenna: position of the station's antenna, m, (3,).
     time: increasing times of the path's points, s, (t,).

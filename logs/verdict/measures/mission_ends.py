@@ -1,4 +1,4 @@
-"""Check how a mission ends: with the takeoff and the landing that PX4 requires, or with ArduPlane's own return."""
+"""Check how a mission begins and ends: take-off and landing that PX4 requires, and ArduPlane's return to launch."""
 
 import math
 
@@ -9,7 +9,7 @@ from logs.verdict.tolerances import FINAL_WAYPOINT_TOLERANCE_M
 
 
 def judges_return_after_last_item(setup: FlightSetup) -> bool:
-    """Return True if the return to launch that ArduPlane begins after the last item is judged.
+    """Return True if ArduPlane returns to launch after the mission's last item, and this return is judged.
 
     It is not judged for a mission that ends at its scenario's destination.
     """
@@ -19,8 +19,9 @@ def judges_return_after_last_item(setup: FlightSetup) -> bool:
 def _returns_after_last_item(setup: FlightSetup) -> bool:
     """Return True if ArduPlane returns to launch by itself after the mission's last item.
 
-    ArduPlane returns (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a
-    landing, an endless loiter or an endless jump.  Also return False for an imported flight.
+    ArduPlane does so (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return to
+    launch, a landing, an endless loiter or an endless jump.  The result is also False for an imported flight, and for
+    any other autopilot.
     """
     route, mission = setup.route, setup.mission
     ends_in_flight = route.rtl_start is None and route.endless_jump is None
@@ -46,15 +47,18 @@ def _distance_to_destination(setup: FlightSetup) -> float:
 
 
 def _ends_at_destination(setup: FlightSetup) -> bool:
-    """Return True if a mission ends at its scenario's destination, within `FINAL_WAYPOINT_TOLERANCE_M`.
+    """Return True if a mission ends within `FINAL_WAYPOINT_TOLERANCE_M` of its scenario's destination.
 
-    Within this tolerance a flight also reaches its last waypoint.
+    This is also the tolerance within which a flight reaches its last waypoint.
     """
     return not setup.scenario.external and _distance_to_destination(setup) <= FINAL_WAYPOINT_TOLERANCE_M
 
 
 def unjudged_return_text(setup: FlightSetup) -> str:
-    """Explain why a return after the last item is not judged; return "" if it is judged or does not occur."""
+    """Explain why ArduPlane's return to launch after the last item is not judged.
+
+    Return "" if it is judged or does not occur.
+    """
     if not _returns_after_last_item(setup):
         return ""
     if _ends_at_destination(setup):
@@ -63,14 +67,17 @@ def unjudged_return_text(setup: FlightSetup) -> str:
 
 
 def missing_home_text(setup: FlightSetup) -> str:
-    """State that the return after the last item cannot be judged without a home; "" if none is missing."""
+    """State that ArduPlane's return to launch after the last item cannot be judged, because the mission has no home.
+
+    Return "" if the mission has a home, or if this return is not judged for another reason.
+    """
     if setup.mission.home is not None or not judges_return_after_last_item(setup):
         return ""
     return f"{setup.autopilot.title} returns to home by itself after the last item, but the mission has no home"
 
 
 def judged_return_text(setup: FlightSetup) -> str:
-    """Explain why a return after the last item is judged, and how to avoid this return."""
+    """Explain why ArduPlane's return to launch after the last item is judged, and how to avoid it."""
     remedy = "A landing or NAV_LOITER_UNLIM at the end of the mission prevents this return"
     if setup.scenario.external:
         return f"After the last item {setup.autopilot.title} returns to launch by itself. {remedy}"
@@ -86,9 +93,9 @@ _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "b
 
 
 def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
-    """Describe why PX4 refuses a mission without the take-off or landing that the limits require.
+    """Explain why PX4 refuses a mission that lacks a required take-off or landing; "" if it lacks none.
 
-    Return "" if the mission has what they require.
+    limits: PX4's feasibility limits, with the required items (MIS_TKO_LAND_REQ).
 
     >>> missing_ends_text(Mission(None, ()), FeasibilityLimits(requires=2))
     "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"

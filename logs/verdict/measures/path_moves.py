@@ -67,12 +67,11 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
-    """Return the moves of all pieces of a fly-by path that touch some legs; they start at time 0.
+    """Return the moves of all pieces of a fly-by path that touch the legs `first_leg` to `last_leg`.
 
-    A piece may also cover part of a neighbouring leg.
+    The first move begins at time 0.  A piece may also cover part of a neighbouring leg.
 
-    first_leg, last_leg: range of these legs.
-    speeds: ground speed on each leg, m/s, (legs,).
+    speeds: ground speed on each leg of the route, m/s, (legs,).
     """
     nodes = path.nodes
     breaks = np.concatenate([nodes["distance"] - nodes["half_length"], nodes["distance"] + nodes["half_length"]])
@@ -169,7 +168,7 @@ def move_blocks(
 ) -> Records:
     """Return the bounding box of each `BLOCK_MOVES` consecutive moves, (b,) of dtype `BLOCK`.
 
-    heights, to_pixel, spacing: terrain heights, m, map from positions to their pixels, and distance of pixels, m.
+    heights, to_pixel, spacing: terrain heights, m, map from positions to their pixels, and distance between pixels, m.
     reads_ground: True to compute the steepest ground below each block, for zones with a limit above ground.
     """
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)

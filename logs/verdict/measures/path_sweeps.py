@@ -1,4 +1,4 @@
-"""Measure a whole path, compiled: height above ground, and time and exposure inside spheres.
+"""Measure a whole path with compiled code: height above ground, and time and exposure inside spheres.
 
 A path consists of n points (m, (n, 3)) with a time (s) each: the rows of a flown track, or the points of a planned path
 with the times at which they would be passed.  The results are exact on each straight segment.
@@ -24,11 +24,12 @@ _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground (m) and its place, (n - 1,) each.
+    """Return each segment's minimum height above ground, m, and the fraction of the segment at which it occurs.
 
-    The place is a fraction of the segment.
-    The height is NaN if a segment leaves the terrain data; the fraction is then the place where it first does.
+    Both have shape (n - 1,).  The height is NaN if a segment leaves the terrain data; the fraction is then where it
+    first does.
 
+    heights, to_pixel: terrain heights, m, and map from positions to their pixels.
     points: ends of the segments, m, (n, 3).
     """
     clearance, fraction = _path_clearances(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
@@ -37,7 +38,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
 @compiled
 def _path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground, and where it occurs; see `path_clearance`."""
+    """Return each segment's minimum height above ground and its fraction of the segment; see `path_clearance`."""
     return path_clearances(heights, to_pixel, points)
 
 
@@ -214,11 +215,11 @@ def _add_stay(
 
 
 # ----------------------------------------------------------------------
-# Ground below each segment of a flown track, and spheres that the track passes through, by the formulas of `world`.
+# Clearance of each segment of a flown track, and the track's stays in a sphere; rows may be implausible here.
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class SphereStay:
     """One stay inside a sphere.
 
     start, end: times of entry and exit, s.
@@ -235,20 +236,19 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum height above ground (m) and its place, (t - 1,) each.
+    """Return each track segment's minimum height above ground, m, and the fraction of the segment at which it occurs.
 
-    The place is a fraction of the segment.
-    The height is NaN if the segment leaves the terrain data or has an implausible end.
+    Both have shape (t - 1,).  The height is NaN if the segment leaves the terrain data or has an implausible end.
 
-    position: m, (t, 3).
+    position: positions of the track, m, (t, 3).
     """
     return _plausible_clearances(terrain.heights, terrain.to_pixel.record, read_only(np.ascontiguousarray(position)))
 
 
-def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
-    """Return the periods that a track spends inside a sphere or on its surface, in order of time.
+def sphere_stays(time: Floats, position: Floats, centre: Floats, radius: float) -> list[SphereStay]:
+    """Return a track's stays inside a sphere, in order of time.
 
-    There are none for a radius of 0 or a track of fewer than two rows.  A period that lasts until the last row is not
+    There are none for a radius of 0 or a track of fewer than two rows.  A stay that lasts until the last row is not
     `whole`.
 
     time, position: times, s, (t,), and positions, m, (t, 3), of the track.
@@ -265,7 +265,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     step = np.diff(time)
     start, end = (time[rows] + fractions[rows] * step[rows] for fractions in (entry_fraction, exit_fraction))
     first_indices = np.flatnonzero(np.append(True, start[1:] - end[:-1] > SPHERE_STAY_TOLERANCE_S))
-    stays: list[Passage] = []
+    stays: list[SphereStay] = []
     for indices in np.split(np.arange(rows.size), first_indices[1:]):
         closest_row = rows[indices[np.argmin(closest[rows[indices]])]]
         last = rows[indices[-1]]
@@ -276,7 +276,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
             float(closest[closest_row]),
             float(time[closest_row]),
         )
-        stays.append(Passage(*values, whole=bool(is_whole)))
+        stays.append(SphereStay(*values, whole=bool(is_whole)))
     return stays
 
 
@@ -291,7 +291,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Compute clearances like `_path_clearances`, but NaN for segments with an implausible end."""
+    """Compute clearances as `_path_clearances` does, but with NaN for segments with an implausible end."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)

@@ -1,4 +1,4 @@
-"""Measure how much of a photo line was flown usably for photos, and how much its photos overlap."""
+"""Measure how much of a photo line was flown so that its photos can be used, and how much a survey's photos overlap."""
 
 import itertools
 import math
@@ -40,9 +40,9 @@ class LineMeasure:
     lost_at_start, lost_at_end: lost length at either end of the line, m; an unknown part is not lost.
     max_lateral_offset: maximum distance to the side of the line, m.
     max_height_error: maximum height error, m, positive above; NaN if unknown everywhere.
-    photos, missed_photos: number of planned photos, and of those not taken, also because the camera is too slow; 0 if
-        no distance between photos is stated.
-    taken_photos: number of photos that the camera takes on the line, counted from where it is switched on.
+    planned_photo_count, missed_photo_count: number of planned photos, and how many of them are missed, also because the
+        camera is too slow; both 0 if no distance between photos is stated.
+    taken_photo_count: number of photos that the camera takes on the line, counted from where it is switched on.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
     lost_spans, unknown_spans: start and end of each lost part and of each unknown part, m from the line's start.
@@ -58,14 +58,14 @@ class LineMeasure:
     lost_at_end: float
     max_lateral_offset: float
     max_height_error: float
-    photos: int
-    missed_photos: int
+    planned_photo_count: int
+    missed_photo_count: int
     lateral_tolerance: float
     min_height_tolerance: float
     lost_spans: tuple[tuple[float, float], ...] = ()
     unknown: float = 0.0
     unknown_spans: tuple[tuple[float, float], ...] = ()
-    taken_photos: int = 0
+    taken_photo_count: int = 0
 
     @property
     def ok(self) -> bool | None:
@@ -87,7 +87,7 @@ def is_covered(usable: float, unknown: float) -> bool | None:
 
 
 def lateral_tolerance(requirements: RouteRequirements, survey: Survey) -> float:
-    """Return the maximum distance from a survey's line at which a photo may be taken, m."""
+    """Return how far to the side of a survey's line a photo may be taken, m, including the navigation error."""
     return PHOTO_OFFSET_FRACTION * survey.spacing + position_error(requirements.setup)
 
 
@@ -120,7 +120,7 @@ class _LineRows:
 def _line_rows(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> _LineRows | None:
-    """Return the rows on which a photo line may have been flown; None for fewer than two rows."""
+    """Return the rows on which a photo line may have been flown; None if it was not reached or has only one row."""
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     # From the waypoint before the line and its leads to the waypoint after them.
     first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
@@ -178,7 +178,7 @@ def measure_line(
         line.photo,
         np.interp(step_middles, along[is_ahead][order], speeds) if speeds.size else np.zeros(len(step_middles)),
     )
-    photos, missed_photos = _count_photos(line, is_taken, length, spacing)
+    planned_photo_count, missed_photo_count = _count_photos(line, is_taken, length, spacing)
     # Photos taken on the line, up to `PHOTO_STEP_M` beyond its ends.
     photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
     photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
@@ -191,13 +191,15 @@ def measure_line(
         lost_at_end=float((len(is_good) - 1 - kept_steps[-1]) * step) if kept_steps.size else length,
         max_lateral_offset=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
         max_height_error=float(max(height_errors, key=abs, default=math.nan if is_on_line.any() else 0.0)),
-        photos=photos,
-        missed_photos=missed_photos,
+        planned_photo_count=planned_photo_count,
+        missed_photo_count=missed_photo_count,
         lateral_tolerance=lateral_tolerance(requirements, survey),
         min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
         lost_spans=_runs_of_set_steps(~is_kept, step),
         unknown_spans=_runs_of_set_steps(is_kept & ~is_good, step),
-        taken_photos=int(np.count_nonzero((rows.is_ahead & rows.conditions["off_line"] & is_between_ends)[photo_rows])),
+        taken_photo_count=int(
+            np.count_nonzero((rows.is_ahead & rows.conditions["off_line"] & is_between_ends)[photo_rows])
+        ),
     )
 
 
@@ -208,7 +210,7 @@ def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, 
 
 
 def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
-    """Return the heights of positions (n, 3) above ground, m, (n,).
+    """Return the heights of positions (n, 3) above ground, m, (n,); NaN where the ground is unknown.
 
     Without terrain, heights are above home, or above the route's lowest waypoint if there is no home.
     """
@@ -226,10 +228,10 @@ def _camera_on_rows(
     track_rows: slice,
     is_ahead: Flags,
 ) -> Flags:
-    """Return a mask (n,): True for each row of a range of the track at which the camera is on.
+    """Return a mask (n,): True for each of n consecutive rows of the track in which the camera is on.
 
     axis: axis of the line, onto which positions are projected.
-    track_rows: the range of n rows.
+    track_rows: range of the n rows in the track.
     is_ahead: True for each row that flies along the line.
 
     The camera is on between two rows: the row that reaches the waypoint where the mission switches it on, and the row
@@ -257,10 +259,10 @@ def _camera_on_rows(
 def _switch_radii(
     requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, track_rows: slice
 ) -> Floats | float:
-    """Return the distance before a waypoint at which the items after it switch the camera, m.
+    """Return the distance before a waypoint at which the items after it take effect and switch the camera, m.
 
     The distance is 0 at a gate, which is passed at its plane, and for an autopilot that follows a path.  If it depends
-    on the ground speed, it is returned for each of a range of n rows, (n,).
+    on the ground speed, it is an array with a distance for each row of `track_rows`.
     """
     turns = requirements.setup.autopilot.turns
     if turns.follows_path or _is_gate(requirements, waypoint):
@@ -271,7 +273,10 @@ def _switch_radii(
 
 
 def planned_switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
-    """Return the distance before a waypoint at which the items after it switch the camera on the planned path, m."""
+    """Return the distance before a waypoint at which the items after it switch the camera on the planned path, m.
+
+    The distance is 0 at a gate, and for an autopilot that follows a path.
+    """
     turns = requirements.setup.autopilot.turns
     if turns.follows_path or _is_gate(requirements, waypoint):
         return 0.0
@@ -307,13 +312,13 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
 
 
 def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floats) -> tuple[int, int]:
-    """Return the number of planned photos on a line, and the number of those that are not taken.
+    """Return the number of planned photos on a line, and how many of them are missed.
 
-    Both are 0 for a line without photos.
+    Both are 0 for a line that states no distance between photos.
 
     is_taken: True for each step of the line on which the camera takes photos, (n,).
     length: length of the line, m.
-    spacing: distance between photos that the camera can take on each step of the line, m.
+    spacing: distance between photos that the camera achieves on each step, m, (n,).
     """
     if line.photo <= 0.0:
         return 0, 0
@@ -339,10 +344,10 @@ def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Fl
 
 
 def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> int:
-    """Return the row in which the items after a waypoint switch the camera.
+    """Return the row of the track in which the items after a waypoint take effect and switch the camera.
 
-    At a gate it is the first row behind the gate's plane.  Otherwise it is the first row within the switching distance,
-    or the row that passes the waypoint if there is none.
+    At a gate it is the first row behind the gate's plane.  Otherwise it is the first row within the distance from
+    `_switch_radii`, or the row that passes the waypoint if there is none.
     """
     first, last = int(aligned.rows[max(0, waypoint - 1)]), int(aligned.rows[waypoint]) + 1
     offsets = aligned.track.position[first:last, :2] - requirements.points[waypoint, :2]
@@ -361,11 +366,11 @@ def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) 
 
 
 def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: range) -> NDArray[np.int64]:
-    """Return the row of the track at which the camera takes each photo on some legs, (n,).
+    """Return the row of the track in which the camera takes each photo on some legs, (n,).
 
-    The photos of neighbouring legs with the same distance between photos are included, because the camera counts from
-    the place where it was switched on and took its first photo.  Items that state no distance add no photos, nor do
-    legs that the flight has not reached.
+    Neighbouring legs with the same distance between photos are included, because the camera measures this distance from
+    the place where it was switched on and took its first photo.  Legs for which no distance is stated, and legs that
+    the flight has not reached, have no photos.
     """
     setup, track, photo_rows = requirements.setup, aligned.track, [np.empty(0, dtype=np.int64)]
     spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
@@ -393,8 +398,9 @@ def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: ra
 # the aircraft's tilt is ignored.
 
 
-# Number of steps along each side of a photo, by which the common area of two photos is summed, and the resulting error.
+# The common area of two photos is summed over a grid with this many steps along each side of a photo.
 _AREA_STEPS = 400
+# Largest error of the common area, as a fraction of a photo.
 _AREA_ERROR = 0.003
 
 
@@ -451,9 +457,9 @@ class OverlapMeasure:
 
     @property
     def side_area(self) -> float:
-        """Common area of two photos, turned by the crab angles, at the minimum side overlap, as a fraction of a photo.
+        """Common area of the two photos with the minimum side overlap, turned by their crab angles.
 
-        It is 0 if the side overlap is unknown.
+        It is a fraction of a photo, and 0 if the side overlap is unknown.
         """
         return _common_area(self.camera, self.line_spacing, self.side_height, self.side_crabs)
 
@@ -568,10 +574,10 @@ def measure_overlap(
 def _line_strip(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine
 ) -> _Strip | None:
-    """Return the strip of photos along a line, as flown, or as planned if ``aligned`` is None.
+    """Return the points of a photo line, as flown, or as planned if ``aligned`` is None.
 
     Return None if the line was not flown.  A point is usable if the ground below it is known and, on a flown line, if
-    the conditions of the photos are met there.
+    all conditions for a usable photo are met there.
     """
     if aligned is None:
         axis = LineAxis(requirements.points[line.first : line.last + 1])
@@ -601,11 +607,11 @@ def _line_strip(
 
 
 def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
-    """Return the overlaps of neighbouring photos as fractions of a photo, (n,); negative for a gap.
+    """Return the overlap of each pair of neighbouring photos as a fraction of a photo, (n,); negative for a gap.
 
-    distances: distances between the photos, m, (n,).
-    width: width of a photo as a multiple of the height.
-    heights: heights above ground, m, (n,); a photo from the ground shows nothing.
+    distances: distance between the two photos, m, (n,).
+    width: width of a photo in the direction of this distance, as a multiple of the height.
+    heights: heights above ground, m, (n,).
     """
     return 1.0 - distances / (width * np.maximum(heights, 1e-9))
 
@@ -613,13 +619,15 @@ def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
 def _with_side_overlap(
     measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
 ) -> OverlapMeasure:
-    """Return a copy of the measure with the minimum side overlap, between photos of neighbouring lines.
+    """Return a copy of the measure with the minimum side overlap between photos of neighbouring lines.
 
     All lines are projected onto the first line and divided into the same steps along it.  From one side of the survey
-    to the other, each line is compared at every step with the line that was last seen there.
+    to the other, each line is compared at every step with the previous line that covers this step.
 
-    Two lines are neighbours if they run side by side, no other line lies between them (even one that was lost), and
-    their distance is close to the survey's spacing.  A much larger distance spans a notch in the survey's area.
+    Two lines are neighbours if they run side by side, no other line lies between them (not even a lost one), and their
+    distance is at most `_MAX_NEIGHBOR_SPACINGS`.  A larger distance spans a notch in the survey's area.
+
+    strips: points of each line of the survey; None for a line that was not flown or is not used.
     """
     # Rank of each line from one side of the survey to the other; lines at about the same offset share a rank.
     offsets, ranks = np.array(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
@@ -632,7 +640,7 @@ def _with_side_overlap(
     length = max(float(along.max()) for along in end_distances) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     step_middles = (np.arange(count) + 0.5) * length / count
-    # The line that was last seen at each step: offset (m), height above ground (m), crab angle (rad) and number.
+    # The previous line at each step: offset (m), height above ground (m), crab angle (rad) and number.
     previous_line, lowest_overlap = np.full((4, count), np.nan), math.inf
     for number in lateral_order.tolist():
         strip, along = strips[number], end_distances[number] - min_along
@@ -676,7 +684,7 @@ def _with_side_overlap(
 
 
 def _common_area(camera: Camera, distance: float, height: float, crabs: tuple[float, float]) -> float:
-    """Return the common area of two turned photos side by side, as a fraction of a photo, to `_AREA_ERROR`.
+    """Return the common area of two turned photos side by side, as a fraction of a photo, within `_AREA_ERROR`.
 
     distance: distance between the photos, across the lines, m.
     height: height above ground of both, m.

@@ -1,4 +1,4 @@
-"""Bound the time of a return from any place of a mission, and the time for which the battery lasts after the mission.
+"""Bound the duration of a return to launch from any place of a mission, and the battery time left after the mission.
 
 Both bounds are conservative, so that a failsafe that compares the two (PX4's `rtlEstimateCheck`) certainly does not act
 if the battery lasts longer than the return.
@@ -18,9 +18,9 @@ _MAH_PER_AH = 1000.0
 
 
 def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFailsafe) -> float:
-    """Return an upper bound of the time of a return from anywhere on the mission, s.
+    """Return an upper bound on the duration of a return to launch from anywhere on the mission, s.
 
-    Return inf if there is no destination, or if the wind is as fast as the aircraft.
+    Return inf if there is neither a home nor a rally point, or if the wind is as fast as the aircraft.
 
     The bound is the sum of four times:
     - the delay of the failsafe;
@@ -59,16 +59,18 @@ def _path_length(places: Floats) -> float:
     return float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
 
 
-def remaining_time(
+def remaining_battery_time(
     requirements: RouteRequirements, failsafe: ReturnTimeFailsafe, energy: float, power_factor: float
 ) -> float:
-    """Return a lower bound of the remaining battery time that the autopilot estimates, s; NaN if unknown.
+    """Return a lower bound on the remaining battery time that the autopilot estimates after a flight, s.
+
+    Return NaN if the battery's voltage is unknown.
 
     PX4 divides the remaining charge by its average of the current in level flight, whose initial value is a parameter
     (`Battery::computeRemainingTime`).
 
-    energy: energy used, Wh.
-    power_factor: factor on the power of the aircraft's model.
+    energy: energy that the flight has used, Wh.
+    power_factor: factor by which the power of the aircraft's model is multiplied.
     """
     envelope, route = requirements.setup.envelope, requirements.route
     if not envelope.volts:

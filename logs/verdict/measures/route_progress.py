@@ -1,4 +1,4 @@
-"""Match a track to its route by positions alone, to find the progress of the flight and the rows along each leg.
+"""Match a track to its route by positions alone, to find how far it came and the rows along each leg.
 
 A route that returns to its start, or repeats a lap, passes the same place several times.  The whole track is therefore
 matched to the whole route: both only go forward, and the track may end anywhere on the route.  Data that guidance
@@ -80,16 +80,16 @@ class _Samples:
     sample_of_waypoint: Numbers
 
 
-def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
+def route_progress(route: Route, position: Floats, *, starts_anywhere: bool) -> RouteProgress:
     """Match a track to a route by positions alone, and return its progress along the route.
 
     position: positions in at least two usable rows, m, (t, 3).
-    anywhere: True if the track may begin anywhere on the route, like a part of an imported log; False if it begins at
-        the route's start.
+    starts_anywhere: True if the track may begin anywhere on the route, like a part of an imported log; False if it
+        begins at the route's start.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
-    >>> route_progress(log.setup.route, log.track.position, anywhere=False).target
+    >>> route_progress(log.setup.route, log.track.position, starts_anywhere=False).target
     2
     """
     steps = np.hypot(*np.diff(position[:, :2], axis=0).T)
@@ -105,7 +105,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
         read_only(samples.positions),
         read_only(samples.radii),
         CAPTURE_RADIUS_M,
-        anywhere,
+        starts_anywhere,
     )
     begin_rows, end_rows = rows[ends[:, 0]], rows[ends[:, 1]]
     final_sample = int(np.flatnonzero(ends[:, 0] >= 0)[-1])
@@ -178,12 +178,12 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
 
 
 def rtl_waypoints(route: Route) -> range:
-    """Return the waypoints that represent an RTL, whose path the autopilot chooses; empty without one."""
+    """Return the waypoints that stand for an RTL, whose actual path the autopilot chooses; empty without an RTL."""
     return range(0) if route.rtl_start is None else range(route.rtl_start + 1, route.rtl_end)
 
 
 def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
-    """Return the center (m, (2,)) and the arrival radius (m) of an RTL's loiter; None without an RTL.
+    """Return the center of an RTL's loiter, m, (2,), and its arrival radius, m; None without an RTL loiter.
 
     An RTL has arrived once the aircraft is within the arrival radius of the center.  A simulated flight arrives within
     the same radius (`flight.simulation.tick.update_rtl_loiter`), which does not depend on the waypoints that represent
@@ -198,12 +198,13 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
 
 
 def return_loiter_reach(route: Route, track: Track) -> float | None:
-    """Return the largest distance from the center of a completed RTL loiter, m; None if it is not completed.
+    """Return the largest distance from the center of a completed RTL loiter, m; None if it was not completed.
 
     The loiter is complete after `ENDLESS_LOITER_TIME_S` and one lap.  Both begin when the aircraft is near the center
     and at the loiter's altitude, as in a simulated flight (`flight.simulation.tick.update_rtl_loiter`).  An aircraft
     whose bank limit or wind does not allow the loiter's radius flies wider than the arrival radius, or flies circles
-    beside the center.  There the course counts instead of the bearing, with a quarter turn onto the circle.
+    that do not contain the center.  A lap is therefore also complete after a course change of `END_LOITER_ANGLE_RAD`,
+    which includes a quarter turn onto the circle.
     """
     loiter, arrival_circle = route.rtl_loiter, rtl_arrival_circle(route)
     if loiter is None or arrival_circle is None:
@@ -224,7 +225,7 @@ def return_loiter_reach(route: Route, track: Track) -> float | None:
 
 
 @compiled
-def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
+def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, starts_anywhere: bool) -> Numbers:
     """Match the rows of a track to the samples of a route, both in order, at the lowest total cost.
 
     Dynamic programming fills a table of rows and samples: a cell holds the lowest cost of all matches in which this row
@@ -236,13 +237,13 @@ def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, a
     track: positions, m, (n, 2).
     samples, radii: route samples, m, (m, 2), and the radii within which they are reached, m, (m,).
     capture: distance beyond which the cost of a row does not increase, m.
-    anywhere: True if the track may begin at any sample; False if it begins at the first.
+    starts_anywhere: True if the track may begin at any sample; False if it begins at the first.
 
     Return the first and the last row at each sample, (m, 2); -1 for samples before the track's start or after its end.
     """
     rows, count = track.shape[0], samples.shape[0]
-    # How each row came to each sample: 0 from the sample before, 1 the row before was at the same sample, 2 the sample
-    # is skipped, 3 the track starts there.
+    # Move by which each row came to each sample: 0 from the sample before, 1 the row before was at the same sample,
+    # 2 the sample is skipped, 3 the track starts there.
     moves = np.zeros((rows, count), dtype=np.uint8)
     total = np.zeros(count)
     for i in range(rows):
@@ -254,7 +255,7 @@ def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, a
             cost = min(max(0.0, distance), capture) ** 2
             waiting_cost = total[j]
             if i == 0:
-                min_cost, move = cost + j * _LATE_START_M**2 if anywhere or j == 0 else math.inf, 3
+                min_cost, move = cost + j * _LATE_START_M**2 if starts_anywhere or j == 0 else math.inf, 3
             elif waiting_cost <= advancing_cost:
                 min_cost, move = waiting_cost + cost, 1
             else:

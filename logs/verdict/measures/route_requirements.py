@@ -1,4 +1,4 @@
-"""Compute the requirements of a route, its energy and the aircraft's limits: the planned side of every finding."""
+"""Compute what a route requires of the aircraft, the limits that apply, and the energy that the route needs."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -114,7 +114,7 @@ _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 
 def with_fence_zones(setup: FlightSetup) -> FlightSetup:
-    """Return the setup with its mission's fence added to its scenario's zones, for drawing.
+    """Return the setup with the mission's fence zones added to the scenario's zones, for drawing.
 
     >>> from logs.recording.example_log import example_log
     >>> with_fence_zones(example_log().setup).scenario.zones
@@ -139,7 +139,7 @@ class TurnRequirements:
     length_before, length_after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
     reversal: (w - 1,) m of leg on which the aircraft rolls from a turn to one side into a turn to the other side; 0 on
         all other legs.
-    limit: (w,) rad, the sharpest turn there that fits both legs next to the neighbouring turns.
+    limit: (w,) rad, the sharpest turn at each waypoint that fits both legs next to the neighbouring turns.
     """
 
     turns: Floats
@@ -165,11 +165,11 @@ def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformanc
 
 
 def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
-    """Return each leg's wind from a forecast, at the middle of the leg; () without a forecast.
+    """Return the forecast wind of each leg, at the leg's midpoint and the estimated time there; () without a forecast.
 
-    The wind is taken at the time when the aircraft reaches the middle of the leg, without loiters. This time
-    assumes that the legs before are flown at the ground speed in their wind, and the first half of the leg at its
-    airspeed. In a head wind that leaves less than 1 m/s of ground speed, the airspeed replaces the ground speed.
+    The time is estimated from the legs before, flown at the ground speed in their wind, and the first half of the leg,
+    flown at its airspeed.  If the wind leaves at most 1 m/s of ground speed on a leg, the airspeed replaces the ground
+    speed.
     """
     if setup.scenario.wind.field is None:
         return ()
@@ -186,9 +186,9 @@ def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
 
 
 def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirements:
-    """Compute each turn's radius and length, and the sharpest turn that fits there.
+    """Compute each turn's radius, the lengths of leg that it uses, and the sharpest turn that fits there.
 
-    performance: aircraft's performance on a leg at an airspeed.
+    performance: function that returns the aircraft's performance on a leg at an airspeed.
     """
     points = route.positions
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
@@ -231,7 +231,7 @@ def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirem
 
 
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
-    """Return the lengths of leg (m) that a turn (rad) uses before and after its waypoint.
+    """Return the lengths, m, that a turn (rad) uses of the legs before and after its waypoint.
 
     A fly-over uses only the leg after its waypoint.  Both lengths are 0 without a turn, and infinite for a fly-by with
     a turn larger than `U_TURN_RAD`.
@@ -252,10 +252,11 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 def available_lengths(
     runs: Floats, length_before: Floats, length_after: Floats, reversal: Floats, waypoint: int
 ) -> tuple[float, float]:
-    """Return the lengths (m) of the legs before and after a waypoint that its turn may use.
+    """Return the lengths, m, that the turn at a waypoint may use of the legs before and after it.
 
-    Each turn may use at least half of a leg.  On a leg too short for both of its turns, a turn that needs more than
-    half of the leg thus has the fault.
+    Each turn may use at least half of a leg, less the length for the roll between opposite turns.  If a leg is too
+    short for both of its turns, a turn that needs more than half of the leg is therefore the one that does not fit.
+
     runs, reversal: length of each leg, and the length that the roll between opposite turns uses, m, (w - 1,).
     length_before, length_after: lengths that the turn at each waypoint uses, m, (w,).
     """
@@ -266,10 +267,11 @@ def available_lengths(
 
 
 def sharpest_fly_over_turn(radii: float) -> float:
-    """Return the sharpest fly-over turn that fits the leg after its waypoint, rad.
+    """Return the sharpest fly-over turn that fits the leg after its waypoint, rad, at most pi.
 
-    This is the inverse of `fly_over_run`.
-    With half the turn h and z = (cos h + sqrt(1 + cos^2 h))^2, the square of the length is 6 z - z^2 - 1.
+    This is the inverse of `fly_over_run`.  With half the turn h and z = (cos h + sqrt(1 + cos^2 h))^2, the square of
+    the length is 6 z - z^2 - 1.
+
     radii: length of the leg in turn radii.
 
     >>> round(math.degrees(sharpest_fly_over_turn(fly_over_run(math.radians(70.0)))), 6)
@@ -315,19 +317,19 @@ class FlownGround:
     landing_start_row: int
 
     @property
-    def launch(self) -> Track:
+    def takeoff_track(self) -> Track:
         """Track of the take-off."""
         return self.track.rows(0, self.takeoff_end_row + 1)
 
     @property
-    def landing(self) -> Track:
+    def landing_track(self) -> Track:
         """Track of the landing."""
         return self.track.rows(self.landing_start_row, len(self.track))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteRequirements:
-    """Turns, legs, limits and planned path of a route in numbers: computed once for each verdict.
+    """Numbers of a route for its verdict, computed once: its turns, its legs, the limits, and the planned path.
 
     route: the setup's route, with true airspeeds if the autopilot treats commanded airspeeds as equivalent airspeeds.
 
@@ -408,11 +410,11 @@ class RouteRequirements:
         """Return the mean wind on a leg."""
         return self.winds[leg] if self.winds else self.setup.scenario.wind
 
-    def waypoint(self, index: int) -> Place:
+    def waypoint_place(self, index: int) -> Place:
         """Return the place of a finding on a waypoint."""
         return Place("waypoint", index, self._item_number(index), number=int(self.setup.route.stops[index]))
 
-    def leg(self, index: int) -> Place:
+    def leg_place(self, index: int) -> Place:
         """Return the place of a finding on a leg, with the item to which the leg leads."""
         # This is `Route.leg_numbers[index]`, but that property is too slow to read for each leg of a long mission.
         number = max(int(self.setup.route.stops[index + 1]) - 1, 0)
@@ -475,7 +477,7 @@ class RouteRequirements:
 def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
     """Compute the requirements of a setup's route, and the aircraft's limits on each turn and leg.
 
-    envelope: False to judge by the flight alone, without the aircraft's limits.
+    envelope: False to judge by the flight alone; the aircraft's limits on turns and slopes are then inf.
     """
     route, limits = true_airspeed_route(setup), setup.limits
     points = route.positions
@@ -543,7 +545,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     )
 
 
-# Setups whose surveys were searched last, and these surveys, which several parts of one verdict need.
+# Cache of the setups whose surveys were searched last, with these surveys: several parts of one verdict need them.
 _last_surveys: list[tuple[FlightSetup, tuple[Survey, ...]]] = []
 # Number of setups whose surveys are kept.
 _MAX_KEPT_SURVEYS = 4
@@ -575,9 +577,9 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 def true_airspeed_route(setup: FlightSetup) -> Route:
-    """Return a setup's route with the true airspeeds that are demanded in flight.
+    """Return a setup's demanded route with true airspeeds.
 
-    ArduPlane's commands are equivalent airspeeds, which are converted at each leg's mean altitude.
+    ArduPlane's commands are equivalent airspeeds, which are converted to true airspeeds at each leg's mean altitude.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -620,7 +622,7 @@ def _leg_limits(
 
 
 def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turns: TurnRequirements) -> Floats:
-    """Return the length next to each turn over which the slope still changes, m, (w,).
+    """Return the length beyond each turn, on either side, over which the slope still changes, m, (w,).
 
     The altitude follows a parabola about each end of the arc, or about the waypoint if there is no arc.
     """
@@ -658,14 +660,14 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
-    """Return the lower turn limit at a waypoint, the scenario's or the aircraft's (rad), and its source."""
+    """Return the turn limit at a waypoint, rad, and its source: scenario or aircraft, whichever limits it more."""
     return tighter_turn_limit(requirements, waypoint, float(requirements.turn_limit[waypoint]))
 
 
 def tighter_turn_limit(requirements: RouteRequirements, waypoint: int, aircraft_limit: float) -> tuple[float, str]:
-    """Return the lower of two turn limits, the scenario's and `aircraft_limit`, rad, and its source.
+    """Return the lower of the scenario's turn limit and `aircraft_limit`, rad, and its source.
 
-    The scenario's limit does not apply to the corners of a loiter.
+    The source is "scenario", "aircraft" or "none".  The scenario's limit does not apply to the corners of a loiter.
     """
     scenario_limit = requirements.limits.max_turn
     # The corners of a loiter are planfly's drawing, not turns of the mission.
@@ -687,9 +689,10 @@ def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, floa
 
 
 def slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool | None = None) -> tuple[float, str]:
-    """Return the limit on a climb or a dive along a leg (rad, positive), and its source.
+    """Return the limit on a climb or a dive along a leg, rad, positive, and its source.
 
-    The limit is the lower of the scenario's and the aircraft's.  The source is "scenario", "aircraft" or "none".
+    It is the scenario's or the aircraft's limit, whichever is lower.  The source is "scenario", "aircraft" or "none".
+
     is_climb: True for a climb, False for a dive, None for the direction of the leg itself.
     """
     is_climb = bool(requirements.slopes[leg] >= 0.0) if is_climb is None else is_climb
@@ -745,10 +748,10 @@ def ground_slope_limit(
 
 
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
-    """Return the fly-by arc at a leg's end if it is too steep, otherwise None.
+    """Return the fly-by arc at a leg's end if it is steeper than the aircraft can fly, otherwise None.
 
-    The height dh by which the arc exceeds the aircraft's ability changes the airspeed V by g dh / V.  The arc is too
-    steep if this change exceeds `SPEED_TOLERANCE_MPS`.
+    A climb or descent at the aircraft's limit misses the arc's end by a height dh, which changes the airspeed V by
+    g dh / V.  The arc is too steep if this change exceeds `SPEED_TOLERANCE_MPS`.
     """
     corner = leg + 1
     if (
@@ -782,7 +785,9 @@ MAX_ENERGY_RATIO = 2.0
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN without power data.
+    """Predict the energy, Wh, and the peak current, A, of steady flight along a route.
+
+    Both are NaN without power data, or if a leg cannot be held in the wind; the current also without a voltage.
 
     Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.  The
     prediction leaves out turns and gusts, which take a few per cent more.
@@ -793,9 +798,9 @@ def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
 
 
 def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Predict the energy of steady flight on each leg (Wh), and the peak power (W).
+    """Predict the energy of steady flight on each leg, Wh, and the peak power, W.
 
-    Both are NaN without power data.
+    All are NaN without power data, or if the course of a leg cannot be held in the wind.
     """
     envelope, route = requirements.setup.envelope, requirements.route
     if not np.isfinite(requirements.ground_speed).all():

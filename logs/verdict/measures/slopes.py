@@ -74,8 +74,10 @@ def straight_span(
 ) -> tuple[float, float]:
     """Return start and end of the straight part of a leg between its turns, m from the leg's start.
 
+    The end is before the start if the leg has no such part.
+
     clearance: distance kept from the turns, m.
-    excludes_blends: True to exclude also the parts next to the turns on which the slope changes (blends).
+    excludes_blends: True to exclude also the blends, the parts next to the turns on which the slope still changes.
     """
     start_clearance, end_clearance = clearance, clearance
     if excludes_blends:
@@ -91,7 +93,7 @@ def straight_span(
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Return a leg's flown course, or None if the leg was not flown.
 
-    The course of a leg that is too short for a fit is the mean over at least one second, with a larger tolerance.
+    If the leg is too short for a fit, its course is the mean over at least one second, with a larger tolerance.
     """
     if not aligned.has_flown(leg):
         return None
@@ -226,7 +228,7 @@ class SlopeMeasure:
 
 
 def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> SlopeMeasure:
-    """Measure the climb or descent on a leg; the fields keep their defaults if the leg was not flown."""
+    """Measure the climb or descent on a leg; all fields have their defaults if the leg was not flown."""
     if not aligned.has_flown(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
@@ -253,7 +255,8 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
         full_time, idle_time = float(is_at_full.sum() * aligned.tick), float(is_at_idle.sum() * aligned.tick)
         commanded = float(requirements.route.leg_airspeeds[leg])
         error = track.airspeed[steady].astype(np.float64) - commanded
-        # A gust along the track changes the airspeed but not the energy.  So the error in the mean wind counts, too.
+        # A gust along the track changes the airspeed but not the energy.  An airspeed error is therefore no larger than
+        # the error that the aircraft would have in the mean wind.
         mean_wind = requirements.setup.scenario.wind_velocities(track.position[steady], track.time[steady])
         east, north = (track.velocity[steady, :2] - mean_wind[:, :2]).T
         up = track.velocity[steady, 2].astype(np.float64)
@@ -287,7 +290,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from the time at which its commanded airspeed can be reached; may be empty."""
+    """Return the rows of a leg after the time that the change to its commanded airspeed may take; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -388,9 +391,9 @@ def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: floa
 
 
 def _max_mean_in_mask(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Return the largest mean of `value` over `width` consecutive rows, most of them with `mask` True.
+    """Return the largest mean of `value` over `width` consecutive rows of which most have a True `mask`.
 
-    "Most" means the fraction `SATURATED_FRACTION`.  Return 0 without such rows, or if the mean is negative.
+    "Most" means at least the fraction `SATURATED_FRACTION`.  Return 0 without such rows, or if the mean is negative.
     """
     if mask.size < width:
         return 0.0

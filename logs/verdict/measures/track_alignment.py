@@ -55,7 +55,7 @@ class AlignedTrack:
     """Track of t usable rows, aligned with a route of w waypoints.
 
     track: the usable rows.
-    bad_rows: number of rows with non-finite or implausible numbers, or with a time not later than the row before.
+    bad_rows: number of rows left out because of non-finite or implausible numbers, or of a time not later than before.
     first_bad: time of the first bad row, s; NaN if there is none.
     rows: row nearest to the point at which the planned path passes each waypoint (apex), (w,), never decreasing; the
         last row for a waypoint that the flight did not reach.
@@ -98,10 +98,11 @@ class AlignedTrack:
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
     def leg_segments(self, leg: int) -> tuple[int, int]:
-        """Return the first segment of the track on a leg, and the one after its last; 0, 0 without any.
+        """Return the range of the track's segments on a leg: the first one, and the one after the last.
 
-        The first leg includes the track before it, the last leg the track after it.  If both waypoints of a short leg
-        were passed at the same row, as within a turn, the leg has the segment after this row.
+        Return (0, 0) for a leg that was not flown.  The first leg includes the track before it, the last leg the track
+        after it.  If both waypoints of a short leg were passed at the same row, as within a turn, the leg has the
+        segment after this row.
         """
         if not self.has_flown(leg) and not self.passed[leg + 1]:
             return 0, 0
@@ -139,7 +140,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         usable_track = Track(*(getattr(track, column.name)[is_usable] for column in fields(track)))
     apexes, last_row = requirements.apexes(), len(usable_track) - 1
     progress = route_progress(
-        requirements.setup.route, usable_track.position, anywhere=requirements.setup.imported_log is not None
+        requirements.setup.route, usable_track.position, starts_anywhere=requirements.setup.imported_log is not None
     )
     centers, arrival_radius = _arrival_circles(requirements)
     route = requirements.setup.route
@@ -201,9 +202,9 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 
 
 def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
-    """Return the arrival circle of each waypoint: centers, m, (w, 2), and radii, m, (w,).
+    """Return the arrival circle of each waypoint as centers, m, (w, 2), and radii, m, (w,).
 
-    A track that ends within this circle has arrived at the waypoint.
+    A track that ends within a waypoint's arrival circle has passed the waypoint.
     """
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.turns.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.points))
@@ -240,9 +241,9 @@ def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats
 
 
 def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum horizontal distance from a target (m), and its place.
+    """Return each track segment's minimum horizontal distance from a target, m, and the fraction at which it occurs.
 
-    The place is a fraction of the segment.
+    Both have shape (n - 1,); the fraction is 0 at the start and 1 at the end of the segment.
 
     position: positions of the track, m, (n, 3).
     target: position, m, (2,) or (3,).
@@ -287,8 +288,9 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
 def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
     """Return the row in which each waypoint was passed, and its distance from the apex (m), (w,) each.
 
-    The row numbers never decrease, and minimize the sum of squared distances from the apexes.  Only rows along each
-    waypoint's legs are considered.
+    The row numbers never decrease.  Among the rows along each waypoint's legs, those with the smallest sum of squared
+    distances from the apexes are taken.
+
     apexes: points at which the planned path passes the waypoints, m, (w, 3).
     """
     position, count, last_row = track.position, len(apexes), len(track) - 1
@@ -405,7 +407,7 @@ def _match_chords(
 
 
 # ----------------------------------------------------------------------
-# Leg on which each row of a track was flown, by the alignment of the verdict.
+# Leg on which each row of a track was flown, found by the same alignment as in the verdict.
 #
 # The legs that guidance recorded are not read, so that a report's tables and a replay agree with the verdict.
 
@@ -448,10 +450,12 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return requirements and aligned track of the part of a flight between take-off and landing.
+    """Return route requirements and aligned track of a flight's airborne part, between take-off and landing.
 
-    The track is None if it has fewer than two usable rows.
-    whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
+    The track is None if it has fewer than two usable rows.  For a flight without ground phases, both are those of the
+    whole route.
+
+    whole_requirements: requirements of the whole route.
     """
     procedures = whole_requirements.setup.ground_phases
     if not procedures:
@@ -481,9 +485,9 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
 
 
 def takeoff_and_approach_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask (t,): True for the rows of the take-off, and from the start of the approach leg on.
+    """Return a mask (t,): True for the rows of the take-off, and for all rows from the start of the approach leg on.
 
-    A take-off or an approach that the flight does not simulate has no rows. The example's flight has neither:
+    A phase that the flight does not simulate has no rows.  The example's flight has neither phase:
 
     >>> from logs.recording.example_log import example_log
     >>> bool(takeoff_and_approach_rows(example_log().track, GroundPhases()).any())
@@ -496,7 +500,10 @@ def takeoff_and_approach_rows(track: Track, procedures: GroundPhases) -> Flags:
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:
-    """Return the end time (s) of each leg except the last, for the whole route including its landing."""
+    """Return the end time of each leg except the last, s, for the whole route including its landing.
+
+    The time is inf for a leg whose end was not reached.
+    """
     ground_phases, end_times = requirements.ground_phases, aligned.leg_ends()
     if ground_phases is None or ground_phases.procedures.approach is None:
         return end_times

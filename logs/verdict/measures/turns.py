@@ -27,10 +27,10 @@ class TurnMeasure:
     overshoot: maximum distance outside the arc, and after the arc outside the next leg, m.
     settled_distance: mean distance from the next leg in the last second before its end, m.
     min_distance: minimum horizontal distance from the waypoint, m.
-    full_circles: number of full circles flown in addition to the corner's turn.
+    full_circles: number of full circles flown in addition to the planned turn.
     is_complete: True if the flight went on after the turn.
-    pass_time: time of the closest approach to the waypoint, s, of a flight that does not follow the arcs.
-    overrun: distance past the next leg's end at that time, m; 0 if the flight joined the leg.
+    pass_time: time of the closest approach to the waypoint, s; None if the flight was measured along planfly's arcs.
+    overrun: distance past the next leg's end at that time, m; 0 if the flight joined the next leg.
     """
 
     angle: float | None = None
@@ -51,8 +51,8 @@ class TurnMeasure:
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack, *, follows_arcs: bool) -> list[TurnMeasure]:
     """Measure the turn at every inner waypoint, in order.
 
-    follows_arcs: True for a flight along planfly's arcs. False to measure overshoot and minimum distance at the corner
-        of the two legs (`_with_passes`).
+    follows_arcs: True for a flight along planfly's fly-by arcs; False to measure overshoot and minimum distance
+        relative to the corner of the two legs.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.measures.route_requirements import route_requirements
@@ -64,11 +64,11 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack, *, fol
     (True, True)
     """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
-    return measures if follows_arcs else _with_passes(requirements, aligned, measures)
+    return measures if follows_arcs else _with_closest_approaches(requirements, aligned, measures)
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> TurnMeasure:
-    """Measure the turn at an inner waypoint; fields keep their defaults if a leg was not flown."""
+    """Measure the turn at an inner waypoint along its arc; all fields have their defaults if a leg was not flown."""
     if not aligned.has_flown(waypoint - 1) or not aligned.has_flown(waypoint):
         return TurnMeasure()
     track = aligned.track
@@ -159,7 +159,7 @@ def _arc_overshoot(
     waypoint: index of the waypoint.
     position: positions of the track at the turn, m, (n, 3).
     distance_along_before, distance_along: their distances along the leg before and along the leg after the waypoint, m.
-    lateral_offset: their offsets from the leg after the waypoint, m.
+    lateral_offset: their offsets from the leg after the waypoint, m, positive to the right.
     """
     if requirements.setup.route.fly_over[waypoint] or not math.isfinite(requirements.length_before[waypoint]):
         return None
@@ -190,15 +190,16 @@ def _arc_overshoot(
 NEXT_LEG_FRACTION = 0.7
 
 
-def _with_passes(
+def _with_closest_approaches(
     requirements: RouteRequirements, aligned: AlignedTrack, measures: Sequence[TurnMeasure]
 ) -> list[TurnMeasure]:
-    """Return turn measures with the closest approach to each waypoint, and the overshoot after it.
+    """Return the turn measures with overshoot and minimum distance relative to the corner instead of the arc.
 
     measures: measures of the turns at all inner waypoints, in order.
 
     The overshoot is the maximum distance from the next leg on the outside of the turn, up to `NEXT_LEG_FRACTION` of
-    that leg or the closest approach to the next waypoint, whichever is sooner. It is None if the leg was not joined.
+    that leg or the closest approach to the next waypoint, whichever is sooner.  It is None if the aircraft was already
+    beyond the end of that leg.
     """
     track_time, rows = aligned.track.time, aligned.rows
     # Time and distance of the closest approach to each waypoint; the times never decrease.
@@ -241,10 +242,7 @@ def _with_passes(
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return times (s, (n,)) and positions (m, (n, 3)) of the track between two times, s.
-
-    Both ends are interpolated.
-    """
+    """Return times, s, (n,), and positions, m, (n, 3), of the track between two times, s, with interpolated ends."""
     time = aligned.track.time
     times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])

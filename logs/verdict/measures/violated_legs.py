@@ -15,9 +15,9 @@ from world.arrays import Floats
 
 
 def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
-    """Return the legs of the planned path that violate a failed finding's threat, zone or area.
+    """Return the legs of the planned path on which the threat, zone or area of a failed finding is violated.
 
-    Return () for a finding of another rule.
+    For a zone, these are all legs from the first to the last violation.  Return () for a finding of another rule.
     """
     path, place = requirements.path, finding.place
     scenario = requirements.setup.scenario
@@ -42,9 +42,9 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
 
 
 def legs_near_missiles(requirements: RouteRequirements, max_distance: float) -> dict[int, tuple[float, int]]:
-    """Find the legs of the planned path that pass a missile's sphere within `max_distance` (m).
+    """Find the legs of the planned path that come within `max_distance` (m) of a missile's sphere.
 
-    Return, by leg, the distance from the nearest sphere (m, negative inside) and the index of its threat.
+    Return, by leg, the distance from the nearest sphere, m, negative inside, and the index of its threat.
     """
     path, threats = requirements.path, requirements.setup.scenario.threats
     radii = threats.kill_radius

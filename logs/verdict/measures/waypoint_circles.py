@@ -11,17 +11,18 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.wording import place_text
 
-# Smallest change of course that counts as a circle at a waypoint, rad; a smaller one hardly leads off the legs.
+# An aircraft circles at a waypoint if its course changes by at least this, rad.  A smaller change hardly leaves the
+# legs.
 _MIN_CIRCLE_RAD = 0.5 * math.pi
 # Maximum number of circles that a text names.
 _MAX_NAMED = 4
 
 
 def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> dict[int, float]:
-    """Return the plain waypoints at which the aircraft circled, each with its altitude error on arrival, m.
+    """Return the altitude error on arrival, m, positive above, by the waypoint at which the aircraft circled.
 
-    The error is positive above.  Some autopilots circle at a waypoint until they are within their altitude tolerance.
-    Return {} for an autopilot that flies on at any altitude.
+    Some autopilots circle at a plain waypoint until they are within their altitude tolerance.  Return {} for an
+    autopilot that flies on at any altitude.
     """
     setup, route, track = requirements.setup, requirements.setup.route, aligned.track
     if not setup.autopilot.deviations.altitude_parameter:
@@ -56,7 +57,7 @@ def circles_text(requirements: RouteRequirements, circles: Mapping[int, float]) 
         return ""
     autopilot = requirements.setup.autopilot
     places = [
-        f"{place_text(requirements.waypoint(waypoint))} (height error {height_error:+.0f} m)"
+        f"{place_text(requirements.waypoint_place(waypoint))} (height error {height_error:+.0f} m)"
         for waypoint, height_error in islice(circles.items(), _MAX_NAMED)
     ]
     more_text = f" and {len(circles) - _MAX_NAMED} more" if len(circles) > _MAX_NAMED else ""

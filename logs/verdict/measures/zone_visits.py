@@ -67,8 +67,8 @@ def violation_depth(exclusion: bool, outline_distance: float, band_distance: flo
     The depth is the shortest distance to the zone's limit, horizontally or vertically.  It is NaN if it depends on
     unknown ground.
 
-    exclusion: True for an exclusion zone, False for an inclusion zone.    outline_distance, band_distance: from
-    `distances_outside_zone`.
+    exclusion: True for an exclusion zone, False for an inclusion zone.
+    outline_distance, band_distance: distances from `distances_outside_zone`, m.
     """
     if band_distance != band_distance:
         # A position outside the zone's outline is outside the zone whatever the height of the ground.
@@ -222,7 +222,7 @@ def _visit_zones(
     For a zone that is certainly further away than the nearest zone, the depth is only an upper bound.
 
     moves: moves of the path, (m,) of dtype `MOVE`.
-    heights, to_pixel, spacing: terrain heights, m, map from positions to their pixels, and distance of pixels, m.
+    heights, to_pixel, spacing: terrain heights, m, map from positions to their pixels, and distance between pixels, m.
     """
     count = records.zones.shape[0]
     visits = np.zeros(count, VISIT)

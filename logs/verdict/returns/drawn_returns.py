@@ -1,4 +1,4 @@
-"""Prepare returns for drawing: the worst paths, and the lowest altitude from which a return is safe.
+"""Prepare simulated returns to launch for drawing: the worst paths, and the lowest safe altitudes along the flight.
 
 Neither is needed to judge returns, and each takes as long as judging them, so they are computed only for a drawing.
 """
@@ -101,7 +101,7 @@ Key = TypeVar("Key")
 
 
 def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -> list[tuple[Key, list[Element]]]:
-    """Group consecutive elements by key; each group also ends with the first element of the next group.
+    """Group consecutive elements by key, and append to each group the first element of the next group.
 
     >>> group_segments([1, 3, 2, 5], lambda one: one % 2)
     [(1, [1, 3, 2]), (0, [2, 5]), (1, [5])]
@@ -125,17 +125,18 @@ def drawn_returns(
 
 
 def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Compute the data for drawing judged returns, without glides and lowest safe altitudes.
+    """Collect what a quick drawing of the returns to launch shows: the worst paths only.
 
-    Those take the most time.
+    Glides and lowest safe altitudes, which take the most time, are left out.
     """
     return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Select and simulate the returns to draw, at most `MAX_DRAWN_PATHS`.
+    """Select the returns to draw, at most `MAX_DRAWN_PATHS`, and simulate them again to store their paths.
 
-    These are the worst return of each kind of failure, then other failures.  If all are safe, it is the lowest return.
+    These are the worst return of each kind of failure, and then other failures.  If all returns are safe, it is the
+    return with the least clearance.  Return () without returns.
     """
     unsafe_ranges = [return_range for return_range in returns.ranges if not return_range.worst.safe]
     worst_range_by_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe_ranges)}
@@ -157,8 +158,8 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     paths = world.fly(starts.subset(rows).rows, targets, store_positions=True).tracks
     worst = []
     for drawn_range, path in zip(drawn_ranges, paths, strict=True):
-        # A drawing marks the position nearest to an entered sphere, the lowest position, or the end of the path for a
-        # failure without a place, such as a return that does not arrive.
+        # A drawing marks the position nearest to the center of an entered sphere, or the lowest position.  For a
+        # failure without a place, such as a return that does not arrive, it marks the end of the path.
         ret, position = drawn_range.worst, path[-1]
         if ret.kind == "threat":
             distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)

@@ -29,7 +29,7 @@ _MAX_BLOCKS = 200
 
 
 class Band(NamedTuple):
-    """Area in which the required height above ground lies between two heights, m.
+    """Area in which the height above ground that a glide requires lies between two limits.
 
     min_height, max_height: limits of the required height above ground, m.
     parts: outlines of the area's parts on the map.
@@ -128,7 +128,7 @@ class _CellBlocks(NamedTuple):
         return np.asarray(block_values.max(axis=(1, 3)))
 
     def outlines(self, is_chosen: Flags) -> tuple[Part, ...]:
-        """Join chosen blocks into areas, and return the areas' outlines with their holes."""
+        """Join the blocks with True in a mask into areas, and return the areas' outlines with their holes."""
         return cell_outlines(self.west, self.south, self.side, is_chosen)
 
 
@@ -155,7 +155,7 @@ def cell_outlines(west: float, south: float, side: float, is_chosen: Flags) -> t
 
 
 def outline_parts(area: BaseGeometry) -> tuple[Part, ...]:
-    """Return the outlines of the polygons of an area, each with its holes; outlines run counter-clockwise.
+    """Return the outline of each polygon of an area, followed by its holes; outlines run counter-clockwise.
 
     >>> [ring.shape for ring in outline_parts(shapely.box(0.0, 0.0, 2.0, 1.0))[0]]
     [(5, 2)]

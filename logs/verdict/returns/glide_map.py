@@ -3,9 +3,9 @@
 The shortest paths over terrain are searched backwards.  One search begins at the destinations and runs against the
 direction of flight.  The label of a cell is the minimum altitude from which a glide reaches a destination: the label of
 the next cell plus the height lost on the step to the next cell, and no less than the ground plus the margin, in the
-cell and between both cells.  So the labels include the terrain, and one search serves every second of a flight.  A step
-costs its length times sink rate over ground speed on its course in the wind at that altitude, which is exact for each
-step.  Labels only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest
+cell and between both cells.  So the labels include the terrain, and one search serves every second of a flight.  The
+cost of a step is its length times sink rate over ground speed, on its course in the wind at that altitude, which is
+exact.  Labels only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest
 step (E. W. Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm 360",
 1969).
 
@@ -189,7 +189,10 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
 
 def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
-    """Set `is_flat` to False in exclusion zones that reach down to `height` (m above ground)."""
+    """Set the mask `is_flat` to False in the cells of exclusion zones whose floor is at most `height` above ground.
+
+    height: m above ground.
+    """
     for z in np.flatnonzero(zones.zones["exclusion"]):
         _exclude_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
@@ -198,7 +201,7 @@ def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: fl
 def _exclude_zone(
     is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
-    """Set the mask `is_flat` to False in the cells of exclusion zone `z` that reaches down to `height`.
+    """Set the mask `is_flat` to False in the cells of exclusion zone `z` where its floor is at most `height`.
 
     height: m above ground.
     west, south: center of the first cell, m.
@@ -232,7 +235,9 @@ _CROSSED_CELL = record_dtype(("east", np.int64), ("north", np.int64), "fraction"
 
 
 def glide_steps() -> tuple[Records, Records]:
-    """Return the 32 steps to nearby cells, of dtype `STEP`, and the cells crossed, of `_CROSSED_CELL`.
+    """Return the 32 steps from a cell to nearby cells, and the cells that each step crosses.
+
+    They are records of dtype `STEP` and of dtype `_CROSSED_CELL`.
 
     >>> made, between = glide_steps()
     >>> len(made), len({round(float(one.course), 6) for one in made})
@@ -293,9 +298,10 @@ def glide_slopes(
     max_altitude: float,
     possible_winds: PossibleWinds | None = None,
 ) -> GlideSlopes:
-    """Return the glide slopes between two altitudes (m AMSL) at an equivalent airspeed (m/s).
+    """Compute the height lost per meter over the ground, by course and by altitude between two altitudes (m AMSL).
 
-    possible_winds: winds of a forecast; the worst of them on each course is used.  None for the mean wind.
+    airspeed: equivalent airspeed of the glide, m/s.
+    possible_winds: winds of a forecast, the worst of which is used on each course; None for the mean wind.
     """
     courses = np.array(glide_steps()[0]["course"])
     slopes = np.zeros((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))

@@ -1,4 +1,4 @@
-"""Compute the destinations to which a flying aircraft can glide.
+"""Compute which destinations an aircraft in flight can reach in a glide, and with how much altitude to spare.
 
 The aircraft flies on for a moment, turns to the path to the destination, and glides.  The path comes from a backward
 search (`logs.verdict.returns.glide_map`) that ignores turns.  Therefore the turn is simulated first, to either side, in
@@ -45,7 +45,7 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left at each start's best destination (m), and its cell, (n,) each.
+    """Return the altitude left on arrival at each start's best destination, m, and the destination's cell, (n,) each.
 
     starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
@@ -91,7 +91,7 @@ def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
 
 # After the reaction time the aircraft turns left or right, in steps of `_TURN_STEP_RAD`, until it heads along the path
 # that the glide map stores for its cell.  Its altitude there, less the minimum altitude of the cell, is the altitude
-# left; the better of the two turns counts.
+# left.  The better of the two turns is taken.
 #
 # The starts are of dtype `flight.autopilots.simulated_returns.RETURN_START`.  spheres, radii: centres, m, (s, 3), and
 # radii, m, (s,), of the kill spheres.  floor: lowest altitude allowed in each cell, m.  min_altitude, destination,
@@ -209,10 +209,12 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
 
 @inner
 def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
-    """Return the largest altitude left at the center of the aircraft's cell or a neighbouring cell, m.
+    """Return the largest altitude left, m, and the row and column of the cell in which it is left.
 
-    Also return the row and the column of that cell.  Neighbours are included because a cell's center may lie in a
-    sphere even if the aircraft does not.
+    The aircraft's cell and its neighbours are compared.  The altitude left is the altitude above the cell's minimum
+    altitude after a glide to the cell's center.  Neighbours are included because a cell's center may lie in a sphere
+    even if the aircraft does not.
+
     slope: height lost per meter of distance to a cell's center.
     """
     row = round((state.north - glider.south) / glider.cell)

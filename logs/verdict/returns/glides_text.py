@@ -3,7 +3,15 @@
 import math
 
 from flight.autopilots.simulated_returns import ENGINE_FAILURE_REACTION_S
-from logs.verdict.returns.judge_glides import MARGIN, REACHES, GlideRange, Glides, GlideSite, NotJudged, Reach
+from logs.verdict.returns.judge_glides import (
+    GLIDE_CLEARANCE_M,
+    REACHES,
+    GlideRange,
+    Glides,
+    GlideSite,
+    NotJudged,
+    Reach,
+)
 from world.wording import count_text
 
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
@@ -37,7 +45,7 @@ def reached_text(reach: Reach) -> str:
 
 
 def glides_headline(glides: Glides) -> str:
-    """Summarize in one line the destinations in reach after an engine failure.
+    """Summarize in one line which destinations are in reach after an engine failure, or why this is not judged.
 
     >>> glides_headline(Glides((), (), 18.0, not_judged="terrain"))
     'not judged: there is no elevation file'
@@ -56,10 +64,10 @@ def glides_headline(glides: Glides) -> str:
         follows_text = ", which would follow the terrain," if glides.follows_terrain else " without the engine"
         own_text = f"{glides.autopilot}'s own return{follows_text} is not simulated"
     else:
-        own_text = f"{glides.autopilot}'s own return arrives over its target from {glides.arrivals}"
-        if glides.unexpected_arrivals:
+        own_text = f"{glides.autopilot}'s own return arrives over its target from {glides.arrival_count}"
+        if glides.unexpected_arrival_count:
             search_text = "where the search, which is pessimistic, does not reach its target"
-            own_text += f" ({glides.unexpected_arrivals} of them {search_text})"
+            own_text += f" ({glides.unexpected_arrival_count} of them {search_text})"
     return f"{reach_text}; {own_text}"
 
 
@@ -79,7 +87,7 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range: best destination, altitude to spare, and the autopilot's own return."""
+    """Describe a time range of engine failures: best destination, altitude to spare, and the autopilot's own RTL."""
     glide, altitude_left = glide_range.lowest_glide, glides.altitude_left(glide_range.lowest_glide)
     time_text, worst_text = f"{glide_range.first:.0f} s", ""
     if glide_range.count > 1:
@@ -108,7 +116,7 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
         case "low":
             min_height = min(own_return.arrival_height, own_return.clearance)
             height_text = f"{min_height:.0f} m above ground on its way to {name}"
-            end_text = f"descends to {height_text}, below the required {MARGIN:.0f} m"
+            end_text = f"descends to {height_text}, below the required {GLIDE_CLEARANCE_M:.0f} m"
         case "ground":
             shortfall = own_return.shortfall
             distance_text = f"{shortfall / 1000.0:.1f} km" if shortfall >= 1000.0 else f"{shortfall:.0f} m"
@@ -129,11 +137,11 @@ def glide_notes(glides: Glides) -> list[str]:
         return []
     notes = [
         f"a glide begins {ENGINE_FAILURE_REACTION_S:.0f} s after the engine failure, at "
-        f"{glides.airspeed_name} {glides.airspeed:g} m/s; it stays at least {MARGIN:.0f} m above ground and outside "
-        "missiles' spheres, but may cross zones",
+        f"{glides.airspeed_name} {glides.airspeed:g} m/s; it stays at least {GLIDE_CLEARANCE_M:.0f} m above ground and"
+        " outside missiles' spheres, but may cross zones",
         "flat ground is found in the elevation file, which contains no trees, houses or water",
     ]
-    if glides.unexpected_arrivals:
+    if glides.unexpected_arrival_count:
         notes.append(
             f"the best glide is searched on a map of {glides.cell:.0f} m cells, each as high as its highest ground, and"
             f" without the height that excess airspeed gives; {glides.autopilot}'s own return is simulated over the"

@@ -1,11 +1,11 @@
 """Judge which destinations are in reach after an engine failure, by the autopilot's own RTL and by the best path.
 
 ArduPlane does not detect an engine failure: its return to launch is simulated without thrust by its control law
-(`flight.autopilots.arduplane.rtl_point_mass`), straight to its target and onto its slope.  The own returns of other
-autopilots without thrust are not simulated.  All destinations in reach
-are found by backward searches from home, the rally points and the landing places of the mission, and from all ground
-that is flat by the elevation file (`logs.verdict.returns.glide_map`).  Both keep `MARGIN` above ground on the whole
-path, and stay out of kill spheres.
+(`flight.autopilots.arduplane.rtl_point_mass`), straight to its target and onto its slope.  The RTL of other autopilots
+is not simulated without thrust.  All destinations in reach are found by backward searches from home, the rally points
+and the landing places of the mission, and from all ground that is flat by the elevation file
+(`logs.verdict.returns.glide_map`).  A glide is required to keep `GLIDE_CLEARANCE_M` above ground on its whole path, and
+to stay out of kill spheres.
 """
 
 import math
@@ -40,7 +40,7 @@ from world.scenario import Scenario
 
 # Height above ground that a glide keeps until it arrives, m.  The simulated ArduPlane's flights without thrust were at
 # most 13 m too high, and the elevation file has an error, too.
-MARGIN = 30.0
+GLIDE_CLEARANCE_M = 30.0
 # Time after the last start for which the winds of a forecast are sampled, s.
 _MAX_GLIDE_TIME_S = 600.0
 # Number of samples of a forecast's wind to the east, to the north and in time, around the flight and its destinations.
@@ -56,9 +56,9 @@ SiteKind = Literal["home", "rally", "landing"]
 # ground; nothing; or unknown, because the aircraft is beyond the elevation data.
 Reach = Literal["home", "site", "flat", "nothing", "unknown"]
 REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
-# Outcome of the autopilot's own return without thrust: over its target; over its target, but lower above ground than
-# `MARGIN` there or before; ground impact short of its target; in a kill sphere; off the elevation data; or not
-# simulated, because it would follow the terrain, or because the autopilot's return without thrust is not known.
+# Outcome of the autopilot's own RTL without thrust: over its target; over its target, but lower above ground than
+# `GLIDE_CLEARANCE_M` there or before; ground impact short of its target; in a kill sphere; off the elevation data; or
+# not simulated, because it would follow the terrain, or because the autopilot's RTL without thrust is not known.
 EngineOutEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
 # Reason why no glide is judged: there is no elevation file; the model has no trim with the throttle closed; or the
 # mission is too large for a map.
@@ -171,17 +171,20 @@ class Glides:
     follows_terrain: bool = False
 
     def count(self, reach: Reach) -> int:
-        """Return the number of glides whose best destination is of this kind."""
+        """Return the number of glides whose best destination is of the kind `reach`."""
         return sum(glide.reach == reach for glide in self.each)
 
     @property
-    def arrivals(self) -> int:
-        """Number of the autopilot's own returns that arrive."""
+    def arrival_count(self) -> int:
+        """Number of starts from which the autopilot's own RTL without thrust arrives."""
         return sum(glide.own_return.end == "arrives" for glide in self.each)
 
     @property
-    def unexpected_arrivals(self) -> int:
-        """Number of the autopilot's own returns that arrive although the search reaches only flat ground or nothing."""
+    def unexpected_arrival_count(self) -> int:
+        """Number of starts from which the autopilot's own RTL arrives, but the search reaches no site.
+
+        The search is more pessimistic than the simulation of the RTL.
+        """
         return sum(glide.own_return.end == "arrives" and glide.reach in ("flat", "nothing") for glide in self.each)
 
     @property
@@ -202,7 +205,7 @@ class Glides:
 
     @property
     def ranges(self) -> tuple[GlideRange, ...]:
-        """Time ranges of consecutive glides with the same result, in order of time."""
+        """Time ranges of consecutive glides with the same destination and RTL outcome, in order of time."""
         ranges = []
         for (site, *_), group in groupby(
             self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own_return.end)
@@ -220,9 +223,9 @@ class Glides:
         return tuple(ranges)
 
     def altitude_left(self, glide: Glide) -> float:
-        """Return the altitude left on arrival at the best destination, m.
+        """Return the altitude left on arrival at a glide's best destination, m.
 
-        It is negative if no destination is in reach, and -inf without a path.
+        It is negative if no destination is in reach, and -inf if no path leads to any.
         """
         altitudes_left = {
             "home": glide.home_altitude_left,
@@ -242,7 +245,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     Low starts in take-offs and landings are omitted, because the aircraft then descends straight ahead.
     """
     starts = starts.subset(np.flatnonzero(~starts.is_low))
-    no_glides = _no_glides(world)
+    no_glides = _empty_glides(world)
     sites, airspeed = no_glides.sites, no_glides.airspeed
     terrain, environment, aircraft = world.scenario.terrain, world.environment, world.aircraft
     if terrain is None or not aircraft.glides:
@@ -251,7 +254,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     if not len(rows):
         return no_glides
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
-    grid = make_glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
+    grid = make_glide_map(terrain, positions, GLIDE_CLEARANCE_M, environment.spheres, environment.radii)
     if grid is None:
         return replace(no_glides, not_judged="far")
     bank, max_altitude = float(world.autopilot.turns.max_bank), float(rows["up"].max())
@@ -261,7 +264,10 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, top_altitude, winds)
 
     def search_glides_to(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        """Return each start's altitude left (m) and reached cell, and the map of minimum altitudes (m)."""
+        """Return each start's altitude left on arrival, m, its reached cell, and the map of minimum altitudes, m.
+
+        cells: rows and columns of the destinations, (c, 2).
+        """
         altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
         lefts, reached_cells = remaining_glide_altitudes(rows, altitudes, aircraft, environment, airspeed, bank)
         return lefts, reached_cells, altitudes.min_altitude
@@ -285,9 +291,9 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     site_by_cell = {
         int(np.ravel_multi_index(tuple(cell), grid.floor.shape)): k for k, cell in enumerate(site_cells) if k
     }
-    # Cells on which a landing is possible: flat, and in no exclusion zone that reaches down to `MARGIN`.
+    # Cells on which a landing is possible: flat, and in no exclusion zone that reaches down to `GLIDE_CLEARANCE_M`.
     is_landable = landable_cells(grid)
-    exclude_zones(grid, is_landable, world.airspace.records, MARGIN)
+    exclude_zones(grid, is_landable, world.airspace.records, GLIDE_CLEARANCE_M)
     flat_altitudes_left, flat_cells, _ = search_glides_to(np.argwhere(is_landable))
     is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     glides = []
@@ -312,7 +318,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     return replace(no_glides, each=tuple(glides), cell=grid.cell, footprint=footprint)
 
 
-def _no_glides(world: ReturnWorld) -> Glides:
+def _empty_glides(world: ReturnWorld) -> Glides:
     """Return a `Glides` without any glide, but with sites, airspeed and autopilot."""
     # Home, the rally points and the mission's landing places.
     mission, origin = world.setup.mission, world.scenario.origin
@@ -332,7 +338,7 @@ def _no_glides(world: ReturnWorld) -> Glides:
 
 
 # ----------------------------------------------------------------------
-# The autopilot's own return.
+# The autopilot's own return to launch without thrust, and the winds of a forecast.
 
 
 def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
@@ -394,6 +400,6 @@ def _engine_out_return(
         end = (
             "unknown"
             if result["outcome"] != RETURN_ARRIVED or math.isnan(arrival_height)
-            else ("arrives" if min(clearance, arrival_height) >= MARGIN else "low")
+            else ("arrives" if min(clearance, arrival_height) >= GLIDE_CLEARANCE_M else "low")
         )
     return EngineOutReturn(target, end, arrival_height, clearance, impact, shortfall)

@@ -2,10 +2,10 @@
 
 If the RTL, or a battery failsafe, leads to a landing sequence of the mission, the path to the sequence is judged.
 
-A return is simulated with a point mass (`flight.autopilots.parts.ReturnBehaviour.fly`), in the mean wind; in a forecast
-in the wind at each place, height and time of its path.  Returns
-whose simulation could be wrong are flown again in JSBSim if the caller provides a function for it.  The JSBSim result
-replaces the result of the point mass for that return and, if it is worse, for all similar returns.
+A return is simulated with a point mass (`flight.autopilots.parts.ReturnBehaviour.fly`), in the mean wind or, with a
+forecast, in the wind at each place, height and time of its path.  Returns whose simulation could be wrong are flown
+again in JSBSim if the caller provides a function for it.  The JSBSim result replaces the result of the point mass for
+that return, and corrects similar returns if it is worse.
 """
 
 import math
@@ -58,10 +58,13 @@ from world.errors import MissionError
 from world.kernels import Record, Records
 from world.scenario import Scenario
 
-# Outcome of a return, the worst first: it hits the ground, enters a missile's sphere, violates a zone, does not arrive,
-# uses more energy than available, leaves the elevation data, may use more energy than available because the power is
-# uncertain or because the energy used before is unknown, differs too much between the point mass and JSBSim, goes below
-# the least height above ground; or is safe.
+# Outcome of a simulated return to launch, the worst first:
+# - "ground": it hits the ground; "threat": enters a missile's sphere; "zone": violates a zone; "lost": does not arrive;
+# - "energy": uses more energy than available; "unknown": leaves the elevation data;
+# - "power", "used": may use more energy than available, because the power is uncertain, or because the energy used
+#   before is unknown;
+# - "unsure": differs too much between the point mass and JSBSim; "low": goes below the required height above ground;
+# - "safe": none of these.
 Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "power", "used", "unsure", "low", "safe"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 # Outcomes that are not judged.
@@ -136,7 +139,7 @@ class SimulatedReturn:
 
     @property
     def safe(self) -> bool:
-        """True if the return is safe."""
+        """True if the outcome of the return is "safe"."""
         return self.kind == "safe"
 
 
@@ -221,12 +224,12 @@ class Returns:
 
     @property
     def safe(self) -> bool:
-        """True if every return is safe and none is undecided; a landing at the end of a return is not judged."""
+        """True if every return is safe and no part is left unjudged; the landing at a return's end is not judged."""
         return bool(self.each) and not self.unjudged_parts and all(ret.safe for ret in self.each)
 
     @property
     def undecided(self) -> bool:
-        """True if no return is known to be unsafe, but some are unknown."""
+        """True if no return is known to be unsafe or too low, but something is not judged."""
         has_failures = bool(self.unsafe) or self.count("low") > 0
         return not has_failures and (bool(self.unjudged_parts) or any(self.count(kind) > 0 for kind in UNJUDGED))
 
@@ -246,12 +249,12 @@ class Returns:
         return sum(ret.starts_too_low for ret in self.each)
 
     def count(self, kind: Kind) -> int:
-        """Return the number of returns with this outcome."""
+        """Return the number of returns whose outcome is `kind`."""
         return sum(ret.kind == kind for ret in self.each)
 
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
-        """Point of no return by energy, for RTL; returns that do not arrive are ignored."""
+        """Point of no return by energy, for RTLs; returns that do not arrive are skipped."""
         last_time, min_energy_left, skipped_count = math.nan, math.inf, 0
         if not self.each:
             return PointOfNoReturn("not flown")
@@ -281,7 +284,7 @@ class Returns:
     def ranges(self) -> tuple[ReturnRange, ...]:
         """Time ranges of consecutive returns with the same destination and outcome, the worst first."""
         ranges = []
-        for _, group in groupby(self.each, _report_key):
+        for _, group in groupby(self.each, _grouping_key):
             returns = list(group)
             ranges.append(
                 ReturnRange(returns[0].time, returns[-1].time, len(returns), min(returns, key=worst_first_key))
@@ -291,10 +294,10 @@ class Returns:
         )
 
 
-def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
+def _grouping_key(ret: SimulatedReturn) -> tuple[object, ...]:
     """Return the key by which returns are grouped: outcome, destination, and the entered sphere or zone.
 
-    Returns that are too low are also grouped by whether the flight itself is too low at their start.
+    For returns that are too low, the key also contains `starts_too_low`.
     """
     key = (ret.kind, ret.target.name)
     if ret.kind == "low":
@@ -310,7 +313,7 @@ def worst_first_key(ret: SimulatedReturn) -> tuple[int, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReturnWorld:
-    """Data that determine the outcomes of simulated returns to launch, except the starts of the returns.
+    """Setting in which returns to launch are simulated: autopilot, destinations, aircraft, ground, spheres and zones.
 
     autopilot: simulated autopilot that returns; it has an RTL.
     home, rally: positions on the map.
@@ -388,7 +391,7 @@ class ReturnWorld:
 
     @property
     def ending(self) -> Ending:
-        """Type of ending of an RTL: a circle or a landing sequence."""
+        """Ending of an RTL: a loiter, or a landing sequence by one of two ways."""
         ending_by_join: dict[str, Ending] = {"circle": "on to land", "straight": "straight to land"}
         return ending_by_join.get(self.autopilot.returns.rules.landing_join, "circle") if self.landings else "circle"
 
@@ -400,7 +403,7 @@ class ReturnWorld:
 
     @property
     def is_simulated(self) -> bool:
-        """True if returns are simulated at all."""
+        """True if returns are simulated; False if the autopilot's RTL cannot be simulated for this mission."""
         return not self.autopilot.returns.unsimulated_text(self.mission)
 
     @property
@@ -441,7 +444,10 @@ class ReturnWorld:
         return self.with_landing(target) if ending == "on to land" else target
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
-        """Return an RTL's target with the landing sequence after its loiter; unchanged without one."""
+        """Return an RTL's target with the landing sequence to which the RTL goes on from its loiter.
+
+        The target is returned unchanged if the RTL does not go on to a landing.
+        """
         landing = nearest_landing_sequence(target.position, self.landings) if self.ending == "on to land" else None
         if landing is None:
             return target
@@ -465,7 +471,7 @@ class ReturnWorld:
 
 
 def unknown_energy_text(setup: FlightSetup) -> str:
-    """Explain why the energy of returns is not judged; return "" if it is judged."""
+    """Explain why the energy of simulated returns to launch is not judged; return "" if it is judged."""
     is_stated = setup.scenario.flight.battery_wh is not None
     if setup.imported_log is not None and not setup.imported_log.aircraft_known:
         return "the log names no aircraft, so energy is not judged"
@@ -474,8 +480,8 @@ def unknown_energy_text(setup: FlightSetup) -> str:
     return "" if setup.envelope.power_level.size else "the aircraft's model states no power, so energy is not judged"
 
 
-def returning_title(setup: FlightSetup) -> str:
-    """Return the title of the autopilot whose RTL is simulated; ArduPlane for one without an RTL."""
+def rtl_autopilot_title(setup: FlightSetup) -> str:
+    """Return the title of the autopilot whose RTL is simulated: the setup's, or ArduPlane's if it has no RTL."""
     autopilot = setup.autopilot.model
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
@@ -512,10 +518,11 @@ def make_return_world(setup: FlightSetup, rtl_autopilot: Autopilot | None = None
     )
 
 
-def without_engine_world(world: ReturnWorld) -> ReturnWorld:
-    """Return a world for returns without an engine; ArduPlane returns if the autopilot has no such return.
+def engine_out_world(world: ReturnWorld) -> ReturnWorld:
+    """Return the world in which returns to launch without thrust are simulated.
 
-    ArduPlane then has the aircraft's parameters, and the airspeeds of the user's PX4 parameter file.
+    It is the given world if its autopilot's RTL can be simulated without thrust.  Otherwise ArduPlane's RTL replaces
+    it, with ArduPlane's parameters for the aircraft, and the airspeeds of the user's PX4 parameter file.
     """
     if world.autopilot.returns.flies_without_engine:
         return world
@@ -548,9 +555,9 @@ def judge_returns(
     max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Simulate and judge the return from each start, once for each of its endings (loiter or landing).
+    """Simulate and judge the RTL from each start, once for each ending of `ReturnWorld.endings`.
 
-    A return from a low start that only sinks to the ground is left out, but counted in `omitted_count`.
+    Returns from low starts that only sink to the ground are left out; `Returns.omitted_count` states their number.
 
     interval: time between starts, s.
     fly_again: function that flies an uncertain return again in JSBSim; None for no such flights.
@@ -614,10 +621,11 @@ def judge_returns(
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
     """Return True if an RTL from a low start sinks to the ground before the aircraft can return.
 
-    Low starts are those in a take-off or a landing.  The path of the return is then not at fault.  Returns that fly
-    into rising ground or hit a hill later do not count.
-    height: height of the start above ground, m.  Above `MIN_JUDGED_HEIGHT_M`, the return must also lose half of this
-        height.
+    Low starts are those in a take-off or a landing; the path of such a return is not at fault.  The result is False for
+    a return that flies into rising ground, or that hits a hill later.
+
+    height: height of the start above ground, m.  From `MIN_JUDGED_HEIGHT_M` on, the return must also lose at least half
+        of this height.
     """
     distance = math.dist(ret.start[:2], ret.lowest_position[:2])
     is_sinking = (
@@ -629,8 +637,8 @@ def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
 _NO_PATH: Floats = np.zeros((0, 3))
 
 
-def find_approaches(targets: Sequence[ReturnTarget]) -> Flags:
-    """Return a mask (n,): True for each target whose return flies the mission's approach to a landing."""
+def flies_landing_approach(targets: Sequence[ReturnTarget]) -> Flags:
+    """Return a mask (n,): True for each target whose return continues along the mission's approach to a landing."""
     return np.array([target.landing is not None and bool(target.landing.next_stops) for target in targets], np.bool_)
 
 
@@ -646,7 +654,7 @@ def exclude_approaches(
     results: simulated returns, (n,) of dtype `RETURN_RESULT`.
     min_heights: required heights above ground, m, (n,).
     """
-    indices = np.flatnonzero((results["clearance"] < min_heights) & find_approaches(targets))
+    indices = np.flatnonzero((results["clearance"] < min_heights) & flies_landing_approach(targets))
     if not indices.size:
         return results
     short_targets = [
@@ -667,17 +675,17 @@ def exclude_approaches(
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the required height above ground of the RTL from each start, m, (n,).
 
-    This is the limit of `ReturnWorld.limit`, even where the flight itself is lower.  In a take-off or a landing it is
-    only the height that the flight's own height permits (`possible_heights`).
+    This is `ReturnWorld.limit`, even where the flight itself is lower.  In a take-off or a landing, it is only the
+    height that the flight's own height permits (`possible_heights`).
     """
     return np.where(starts.is_ground_phase, possible_heights(world, starts), world.limit)
 
 
 def possible_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Return the height above ground that the RTL from each start can keep, at most the limit, m, (n,).
+    """Return the height above ground that the RTL from each start can keep, at most `ReturnWorld.limit`, m, (n,).
 
-    It is below the limit for a start at which the flight itself is below the limit, or soon will be.  From a low start
-    in a take-off or landing it is `_LOW_START_FRACTION` of the height of the start.
+    It is less than this limit from a start at which the flight itself is below the limit, or soon will be.  From a low
+    start in a take-off or landing, it is at most `_LOW_START_FRACTION` of the height of the start.
     """
     start_heights = heights_above_ground(world, starts)
     flight_heights = start_heights - starts.height_loss
@@ -795,7 +803,7 @@ def _recheck_in_jsbsim(
     fly_again: FlyAgain,
     max_flights: int,
 ) -> tuple[list[SimulatedReturn], list[float]]:
-    """Fly doubtful returns in JSBSim, the most doubtful first, and correct the point-mass results.
+    """Fly doubtful returns again in JSBSim, the most doubtful first, and correct the point-mass results.
 
     A return is doubtful if the error of the point mass may change its outcome.  Doubtful returns that begin in a turn
     or too slowly, that end with a landing, or that exceed `max_flights`, are not flown in JSBSim.  They get the
@@ -803,7 +811,7 @@ def _recheck_in_jsbsim(
     worse.
 
     starts: starts of the returns, in the order of `returns`.
-    results: point-mass results of the returns, records of the autopilot's simulation.
+    results: point-mass results of the returns, (n,) of dtype `RETURN_RESULT`.
     fly_again: function that flies a return in JSBSim, see `FlyAgain`.
     max_flights: maximum number of JSBSim flights.
 
@@ -859,9 +867,10 @@ def _corrected_return(
 
     If these differences are large and matter, the outcome becomes "unsure", unless a failure is certain.
 
+    ret, result: the doubtful return by the point mass, and its record of dtype `RETURN_RESULT`.
     offsets: differences (JSBSim minus point mass) in clearance and in distance outside kill spheres, m.
     flown_return: result of the point mass for the return that JSBSim flew.
-    is_flown: True if the flown return is the doubtful return itself.
+    is_flown: True if the return that JSBSim flew is the doubtful return itself.
     """
     height_offset, distance_offset = offsets
     is_low = (
@@ -885,7 +894,7 @@ def _corrected_return(
 def _with_offsets(
     world: ReturnWorld, ret: SimulatedReturn, result: Record, height_offset: float, distance_offset: float
 ) -> SimulatedReturn:
-    """Return a copy of a return with offsets added to its clearance and its distance outside spheres, m."""
+    """Return a copy of a return with offsets (m) added to its clearance and sphere distance, classified again."""
     corrected_result = result.copy()
     corrected_result["clearance"] += height_offset
     corrected_result["sphere_distance"] += distance_offset
@@ -904,7 +913,10 @@ def _with_offsets(
 
 
 def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
-    """Return True if a JSBSim flight can begin at a start, which needs a small bank and enough airspeed."""
+    """Return True if a JSBSim flight can begin at a start: its bank is small, and its airspeed is sufficient.
+
+    row: the start, of dtype `RETURN_START`.
+    """
     place = [float(row[name]) for name in ("east", "north", "up")]
     wind_east, wind_north = world.scenario.wind_velocity(place, float(row["time"]))
     east = float(row["velocity_east"]) - wind_east
@@ -917,7 +929,7 @@ def limit_ratio(ret: SimulatedReturn) -> float:
     """Return a return's distance from its nearest limit, divided by the error of the point mass.
 
     The limits are the ground, the required height and the kill spheres.  Below 1, the error of the point mass may
-    change the outcome.  Return inf for an outcome that depends on no distance, or if all distances are unknown.
+    change the outcome.  Return inf for a violated zone or unknown ground, and if all distances are unknown.
     """
     if ret.kind in ("zone", "unknown"):
         # These outcomes do not depend on a distance.

@@ -1,4 +1,4 @@
-"""Sample the starts of returns to launch at intervals along a flight or path."""
+"""Sample the starts of simulated returns to launch (RTL) at intervals along a flight or a planned path."""
 
 import math
 from dataclasses import dataclass
@@ -39,10 +39,10 @@ SINK_TIME_S = 5.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReturnStarts:
-    """Positions and velocities at which returns begin.
+    """States of the aircraft at which simulated returns to launch begin.
 
     time: flight times, s, (n,).
-    rows: states, (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
+    rows: position, velocity and bank, (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     energy_used: energy used before the return, Wh, (n,); NaN if unknown.
     is_flown: True for a flown track, False for the planned path.
     is_ground_phase: True for a start in the climb-out of a take-off or the approach of a landing, (n,); see
@@ -76,9 +76,10 @@ class ReturnStarts:
 def return_starts(
     setup: FlightSetup, track: Track | None, interval: float, requirements: RouteRequirements | None = None
 ) -> ReturnStarts:
-    """Return the states from which returns start, on the flown track, or on the planned path without a flight.
+    """Sample the starts of simulated returns to launch on the flown track or, without a flight, on the planned path.
 
-    interval: time between two returns, s.
+    track: flown track; None or without rows if there is none.
+    interval: time between two starts, s.
     requirements: the setup's route requirements if already known.
     """
     if track is not None and len(track):
@@ -87,7 +88,9 @@ def return_starts(
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
-    """Sample a flown track as starts of returns, without samples on the ground or in the mission's RTL.
+    """Sample the starts of simulated returns to launch on a flown track.
+
+    Samples on the ground and samples in the mission's own RTL are left out.
 
     interval: time between samples, s.
 
@@ -107,8 +110,8 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     sample_times = np.arange(time[0], time[-1] + 1e-9, interval)
     # Take the next row at or after each sample time; a gap in the log gives only one row.
     sampled_rows = usable_rows[np.unique(np.searchsorted(time, sample_times - 1e-9).clip(0, len(usable_rows) - 1))]
-    # Low rows of a take-off or landing, and low rows too slow to fly. Without terrain, both are all rows of the
-    # take-off and the landing.
+    # Low rows of a take-off or landing, and those of them that are too slow to fly. Without terrain, both are all rows
+    # of the take-off and the landing.
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = takeoff_and_approach_rows(track, procedures)[sampled_rows]
     position = np.asarray(track.position[sampled_rows], dtype=np.float64)
@@ -187,7 +190,10 @@ def _ground_phase_starts(
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return the ground velocities in some rows, m/s, (n, 3); missing ones are computed from positions."""
+    """Return the ground velocities in n rows of a track, m/s, (n, 3).
+
+    A missing velocity is computed from positions, and is 0 if that is not possible.
+    """
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -198,7 +204,9 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequirements | None = None) -> ReturnStarts:
-    """Sample the planned path up to the mission's RTL as starts of returns, with the energy used.
+    """Sample the starts of simulated returns to launch on the planned path up to the mission's RTL.
+
+    The energy used up to each start is predicted.
 
     interval: time between samples, s.
     requirements: the setup's route requirements if already known.
@@ -247,7 +255,7 @@ def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floa
 
 
 def _moves_before_return(setup: FlightSetup) -> Records:
-    """Return the moves (`MOVE`) of the planned path up to its RTL; none if it begins with one."""
+    """Return the moves of the planned path up to the mission's RTL, of dtype `MOVE`; empty if it begins with an RTL."""
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
@@ -257,9 +265,11 @@ def _moves_before_return(setup: FlightSetup) -> Records:
 def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[np.intp], Floats, Floats]:
     """Sample the moves of a planned path at an interval of time.
 
-    Return times (s), numbers of the moves, and the flown fraction of each move, all (t,), and positions (m, (t, 3)).
     moves: at least one straight segment or arc, of dtype `MOVE`.
     interval: time between samples, s.
+
+    Return for each sample its time, s, (t,), the index of its move, (t,), the fraction of this move that is flown,
+    (t,), and the position, m, (t, 3).
     """
     times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), interval)
     move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
@@ -284,7 +294,7 @@ def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[
 
 
 def return_start_at_track_end(track: Track) -> ReturnStarts:
-    """Return the end of a flown track as the start of a return."""
+    """Return the end of a flown track as the only start of a simulated return to launch."""
     row = np.array([len(track) - 1], dtype=np.intp)
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
     records = _start_records(track.time[row], track.position[row], _ground_velocities(track, row), roll)
@@ -293,9 +303,9 @@ def return_start_at_track_end(track: Track) -> ReturnStarts:
 
 
 def return_start_at_path_end(requirements: RouteRequirements) -> ReturnStarts:
-    """Return the end of the planned path as the start of a return, with the predicted energy.
+    """Return the end of the planned path as the only start of a simulated return to launch.
 
-    The aircraft is assumed to fly straight there.
+    The aircraft is assumed to be flying straight there.  The energy used is predicted.
     """
     course = float(requirements.courses[-1])
     slope = math.tan(float(requirements.slopes[-1]))
@@ -309,9 +319,9 @@ def return_start_at_path_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, m/s; the true airspeed if the wind is too strong.
+    """Return the ground speed on each leg in the mean wind, m/s, or the true airspeed if the wind is too strong.
 
-    With a forecast, the wind is taken in the middle of the leg, at the time when the aircraft is there.
+    In a forecast, the wind is taken at the midpoint of the leg and the time when the aircraft is there.
     """
     route, speeds = true_airspeed_route(setup), []
     courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)
@@ -324,7 +334,7 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
 
 
 def _start_records(time: Floats, position: Floats, velocity: Floats, roll: Floats) -> Records:
-    """Return n records of dtype `RETURN_START`.
+    """Return n starts of returns to launch as records of dtype `RETURN_START`.
 
     time: s after take-off, (n,).
     position: m, (n, 3).

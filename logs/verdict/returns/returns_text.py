@@ -1,4 +1,4 @@
-"""Describe returns in words."""
+"""Describe simulated returns to launch in words."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from world.frames import to_geo
 from world.scenario import Scenario
 from world.wording import count_text
 
-# Texts for the outcome of one return, and of several returns.
+# Verb phrases for the outcome of one return.
 _SINGULAR_TEXTS: dict[Kind, str] = {
     "ground": "hits the ground",
     "threat": "enters a missile's sphere",
@@ -38,6 +38,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "descends below {limit:.0f} m above ground",
 }
+# Verb phrases for the outcome of several returns.
 _PLURAL_TEXTS: dict[Kind, str] = {
     "ground": "hit the ground",
     "threat": "enter a missile's sphere",
@@ -81,7 +82,7 @@ ACTION_TEXTS: dict[FailsafeAction, str] = {
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
 }
-# Clauses on the parts of returns that are not judged, by their names in answers.
+# Clauses on the parts of returns that are not judged, by the name of the part in JSON answers.
 UNJUDGED_PART_TEXTS = {
     "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return is used instead",
@@ -101,7 +102,7 @@ def unjudged_parts_text(parts: Sequence[str]) -> str:
 
 
 def return_law_lines(setup: FlightSetup) -> list[str]:
-    """Return lines on the autopilot whose returns are simulated, their path, and their unjudged parts.
+    """Return lines on simulated returns to launch: the autopilot's control law, their path, and unjudged parts.
 
     Return [] for a mission without a home.
     """
@@ -118,7 +119,7 @@ def return_law_lines(setup: FlightSetup) -> list[str]:
 
 
 def segment_text(kind: Kind) -> str:
-    """Return the legend text of a path segment: the outcome of returns that start on it.
+    """Return the legend text of a path segment from which returns have a given outcome.
 
     >>> segment_text("ground")
     'a return hits the ground'
@@ -153,8 +154,8 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
     return ", ".join(parts)
 
 
-def counts_text(returns: Returns) -> str:
-    """State the number of returns by outcome, the worst first, as "3 hit the ground"; "" if all are safe."""
+def failure_counts_text(returns: Returns) -> str:
+    """State how many returns are not safe, by outcome, the worst first, as "3 hit the ground"; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {
         kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
@@ -163,13 +164,13 @@ def counts_text(returns: Returns) -> str:
     return ", ".join(f"{count} {texts[kind]}" for kind, count in counts.items() if count)
 
 
-def headline(returns: Returns) -> str:
-    """Summarize all returns in one line.
+def returns_headline(returns: Returns) -> str:
+    """Summarize all simulated returns to launch in one line.
 
     >>> from logs.verdict.measures.route_requirements import Airspace
-    >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
+    >>> returns_headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no position to return from'
-    >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
+    >>> returns_headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
     reasons = unjudged_parts_text(returns.unjudged_parts)
@@ -186,7 +187,7 @@ def headline(returns: Returns) -> str:
         f"; at {count_text(low_count, 'start')} the flight itself is below the required height" if low_count else ""
     )
     incomplete_text = f"not judged in full ({reasons}): " if reasons else ""
-    total, failure_counts = len(returns.each), counts_text(returns)
+    total, failure_counts = len(returns.each), failure_counts_text(returns)
     common_kind = next((kind for kind in KINDS if returns.count(kind) == total), None)
     subject, verb, texts = (
         (f"all {total} returns", "are", _PLURAL_TEXTS) if total > 1 else ("the only return", "is", _SINGULAR_TEXTS)
@@ -210,7 +211,7 @@ def headline(returns: Returns) -> str:
 
 
 def point_of_no_return_text(returns: Returns) -> str:
-    """Describe the point of no return: after it, a return no longer leaves the battery's reserve.
+    """Describe the point of no return, after which a return to launch no longer leaves the energy reserve.
 
     >>> point_of_no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'point of no return by energy: not judged, because no return was simulated'
@@ -241,13 +242,13 @@ def point_of_no_return_text(returns: Returns) -> str:
     return f"{text}; {count_text(point.skipped_count, 'return')} that {verb} not arrive {be} left out"
 
 
-def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List, in up to three lines, the events that cause a return, a landing, or neither.
+def describe_return_causes(causes: tuple[Cause, ...]) -> list[str]:
+    """List, in up to three lines, the events that cause a return to launch, a landing, or neither.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(FS_GCS_ENABL=1, FS_LONG_ACTN=1)
-    >>> for line in describe_causes(failsafe_causes(made, has_fence=False)):
+    >>> for line in describe_return_causes(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     causes of a return: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
     no return after battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): the aircraft ...
@@ -271,12 +272,12 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     return lines
 
 
-def describe_landing(returns: Returns) -> list[str]:
-    """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
+def describe_rtl_ending(returns: Returns) -> list[str]:
+    """Describe in one or two lines how ArduPlane's RTL ends, by RTL_AUTOLAND and the mission's landing sequences.
 
-    For any other autopilot than ArduPlane, the line is its text on the path of an RTL.
+    For any other autopilot, return its line on the path of an RTL, or [] if it has none.
 
-    >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
+    >>> describe_rtl_ending(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return ends in a loiter at its target']
     """
     if returns.autoland is None:
@@ -307,8 +308,8 @@ def describe_landing(returns: Returns) -> list[str]:
     return lines
 
 
-def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe the returns of a time range: the judgement, the destination and the worst return."""
+def return_range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
+    """Describe the returns to launch from a time range: judgement, destination and worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -332,9 +333,9 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
 
 
 def _height_text(ret: SimulatedReturn, limit: float) -> str:
-    """Return the lowest height of a return as text, with more digits near the required height.
+    """Return the lowest height above ground of a return as text, with more digits near the required height.
 
-    Near the limit, the text also states the limit and its tolerance.
+    If this is `limit` (m), the text near it also states the requirement and its tolerance.
     """
     if not abs(ret.clearance - ret.required_height) < 1.0:
         return f"{ret.clearance:.0f} m above ground"
@@ -399,12 +400,15 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
-    """Describe a remedy and the outcome of the returns after the change."""
+    """Describe a remedy and the outcome of the returns with it.
+
+    returns: returns after the change.
+    """
     changes = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
     if remedy.rally is not None:
         noun = "rally point" if len(remedy.rally) == 1 else "rally points"
         changes.append(f"{len(remedy.rally)} {noun} ({'; '.join(rally_texts(remedy.rally, scenario))})")
-    return f"{' and '.join(changes)}; then {headline(returns)}"
+    return f"{' and '.join(changes)}; then {returns_headline(returns)}"
 
 
 def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:

@@ -1,6 +1,6 @@
-"""Suggest changes that make every return safe: the autopilot's parameters (`ReturnTrials`), or rally points.
+"""Suggest changes that make every return to launch safe: other parameters (`ReturnTrials`), or rally points.
 
-The suggested altitude is the lowest, and the number of rally points the smallest that was found.  Each suggestion is
+The suggested altitude is the lowest that was found, and the number of rally points is the smallest.  Each suggestion is
 simulated from all starts, like judged returns.  Plain set cover does not work for rally points: the autopilot goes to
 the nearest point and not to the best, so a set is rated by the autopilot's choice, and an added point may take returns
 away from a better point.
@@ -22,7 +22,7 @@ from logs.verdict.returns.judge_returns import (
     Returns,
     ReturnWorld,
     exclude_approaches,
-    find_approaches,
+    flies_landing_approach,
     heights_above_ground,
     most_violated_zone,
     possible_heights,
@@ -35,7 +35,7 @@ from world.arrays import Flags, Floats
 from world.kernels import Records
 
 # Margin that is kept beyond each limit, m: twice the error of the point mass.
-MARGIN = 15.0
+RETURN_LIMIT_MARGIN_M = 15.0
 # Step of the height of a return above its destination, m.
 _ALTITUDE_STEP_M = 25.0
 
@@ -58,7 +58,9 @@ class Remedy:
 
 
 def is_improvement(before: Returns, after: Returns) -> bool:
-    """Return True if a change improves the returns and makes no kind of failure more frequent.
+    """Return True if a change improves simulated returns and makes no kind of failure more frequent.
+
+    before, after: returns without and with the change.
 
     "low" returns may become more frequent only if fewer returns are unsafe.
     """
@@ -73,7 +75,7 @@ def is_improvement(before: Returns, after: Returns) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _ReturnLimits:
-    """Limits of the return from each start.
+    """Limits of the return to launch from each of n starts.
 
     clearance: required height above ground, m, (n,).
     sphere_distance: required distance outside kill spheres, m, (n,).
@@ -87,12 +89,13 @@ class _ReturnLimits:
         return _ReturnLimits(self.clearance[indices], self.sphere_distance[indices])
 
 
-def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return the required height above ground and distance from kill spheres for each return.
+def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = RETURN_LIMIT_MARGIN_M) -> _ReturnLimits:
+    """Return the height above ground and the distance from kill spheres that the return from each start has to keep.
 
     If the start itself is lower or closer to a sphere, only its own value minus the height lost in the turn is
     required.
-    margin: added to the required height, and required as distance from the spheres, m.
+
+    margin: margin that is added to the required height, and required as distance from the spheres, m.
     """
     rows = starts.rows
     sphere_distances = np.full(len(starts), math.inf)
@@ -113,7 +116,7 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
-    """Return a mask (n,): True for each start whose simulated RTL keeps all limits, without `MARGIN`."""
+    """Return a mask (n,): True for each start whose simulated RTL keeps all limits, without any margin."""
     limits = replace(_return_limits(world, starts, margin=0.0), clearance=required_heights(world, starts))
     return _rtls_meet_criterion(world, starts, limits, _meets_all_limits)
 
@@ -131,15 +134,15 @@ def _meets_all_limits(world: ReturnWorld, results: Records, limits: _ReturnLimit
     return np.asarray(_clears_ground(world, results, limits) & (results["sphere_distance"] >= limits.sphere_distance))
 
 
+# Function that returns a mask of the simulated returns (dtype `RETURN_RESULT`) that keep certain limits.
 Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 
 
 def _rtls_meet_criterion(
     world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, criterion: Criterion
 ) -> Flags:
-    """Return a mask (n,): True for each start whose RTL meets a criterion.
+    """Return a mask (n,): True for each start whose RTL, to the destination that the autopilot chooses, is good enough.
 
-    Each RTL goes to the destination that the autopilot chooses.
     criterion: see `_meets_criterion`.
     """
     return _meets_criterion(world, starts, [world.target(row) for row in starts.rows], limits, criterion)
@@ -152,13 +155,14 @@ def _meets_criterion(
     limits: _ReturnLimits,
     criterion: Criterion,
 ) -> Flags:
-    """Return a mask (n,): True for each return to its target that meets a criterion.
+    """Simulate returns and return a mask (n,): True for each return to its target that meets a criterion.
 
+    starts, targets, limits: start, target and limits of each return, n of each.
     criterion: `_clears_ground` or `_meets_all_limits`; with the latter, zones and energy are checked, too.
     """
     sphere_distances = limits.sphere_distance if criterion is _meets_all_limits else np.full(len(starts), -math.inf)
     # A return that is too close or too low is aborted, but not on its approach to a landing.
-    abort_heights = np.where(find_approaches(targets), -math.inf, limits.clearance)
+    abort_heights = np.where(flies_landing_approach(targets), -math.inf, limits.clearance)
     simulated = world.fly(
         starts.rows,
         targets,
@@ -178,7 +182,7 @@ def _meets_criterion(
 
 
 class _ReturnTrial:
-    """Test of returns from all starts, which begins with the starts that failed most recently."""
+    """Test of the returns from all starts in a changed world, which begins with the starts that failed last."""
 
     def __init__(self, starts: ReturnStarts, limits: _ReturnLimits) -> None:
         self._starts, self._limits = starts, limits
@@ -198,7 +202,7 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest return heights, or else other parameters, with which every return is safe.
+    """Suggest RTL altitudes, or else other parameters, with which every return is safe.
 
     Up to two heights are suggested: the lowest with which all returns clear the ground, and the lowest with which all
     are safe.  Return [] if the returns already keep all limits with the present parameters.
@@ -236,7 +240,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
 
 class _AltitudeSearch:
-    """Search, upwards from the present value, for the lowest height of returns above their destination."""
+    """Search, upwards from the present value, for the lowest sufficient RTL altitude above the destination."""
 
     def __init__(self, world: ReturnWorld, present_values: Mapping[str, float]) -> None:
         """Prepare the heights to try.
@@ -248,7 +252,7 @@ class _AltitudeSearch:
         ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
         # Up to the height that clears all ground; without terrain, up to 500 m more than at present.
         max_altitude = (
-            float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
+            float(ground_heights.max()) - world.home.up + world.limit + 2.0 * RETURN_LIMIT_MARGIN_M
             if world.environment.known
             else self.current + 500.0
         )
@@ -260,11 +264,11 @@ class _AltitudeSearch:
         self._candidates = [float(altitude) for altitude in altitude_grid]
 
     def values(self, altitude: float) -> dict[str, float]:
-        """Return the parameters that a height (m) changes, by name."""
+        """Return the parameters to change for a height (m), by name; parameters that are not lower keep their value."""
         return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest height from `min_altitude` (m) on with which all returns pass; None for none."""
+        """Return the lowest height from `min_altitude` on with which all returns pass, m, or None if there is none."""
         return first_that_passes(
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
@@ -342,7 +346,7 @@ def _search_in_rounds(
 ) -> tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]]:
     """Search for rally points, simulate all returns, and search again with the starts that remain unsafe.
 
-    searched_starts: starts of the first search.
+    searched_starts: indices of the starts of the first search.
     initial_count: number of candidates, from the first one, that form the initial set.
 
     Return for the best round the number of returns that keep all limits, the points, and the starts that remain unsafe.
@@ -404,13 +408,13 @@ def _rally_candidates(
                 grid_east + radii * np.cos(directions), grid_north + radii * np.sin(directions)
             )
             highest_ground = float(np.max(heights))
-        min_altitude = highest_ground + world.limit + MARGIN
+        min_altitude = highest_ground + world.limit + RETURN_LIMIT_MARGIN_M
         for altitude in (min_altitude, min_altitude + 200.0):
             # Distance outside the nearest kill sphere.
             spheres, sphere_radii = world.environment.spheres, world.environment.radii
             distances = np.linalg.norm(spheres - np.array([grid_east, grid_north, altitude]), axis=1) - sphere_radii
             sphere_distance = float(np.min(distances[sphere_radii > 0.0], initial=math.inf))
-            if math.isfinite(altitude) and sphere_distance > _LOITER_RADIUS_M + MARGIN:
+            if math.isfinite(altitude) and sphere_distance > _LOITER_RADIUS_M + RETURN_LIMIT_MARGIN_M:
                 point_altitude = altitude
                 if end_height > 0.0:
                     terrain = world.scenario.terrain
@@ -424,7 +428,7 @@ def _rally_candidates(
 
 
 class _RallySearch:
-    """Search for rally points, based on which returns to each candidate meet the requirements.
+    """Search for the set of candidate rally points with the most good returns.
 
     A return is good if it keeps all limits.  Returns to the candidates are simulated when first needed.
     """
@@ -468,7 +472,7 @@ class _RallySearch:
 
         point_set: initial set, as indices of candidates.
         """
-        # Simulate the returns from new starts to their nearest candidates; others count as unsafe.
+        # Simulate the returns from new starts to their nearest candidates; all other returns are taken as unsafe.
         new_starts = searched_starts[~self._is_simulated[searched_starts]]
         pairs = [
             (start, int(candidate))
@@ -519,7 +523,7 @@ class _RallySearch:
         return point_set
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
-        """Return the number of good returns if the autopilot chooses among these rally points.
+        """Return the number of good returns from the searched starts if these candidates are the rally points.
 
         The autopilot chooses the nearest point.  It returns as without rally points if this point is too far away, or
         farther than another destination.

@@ -1,4 +1,4 @@
-"""The bounds rule: judge the minimum distance inside the area's box, its floor and its ceiling."""
+"""The bounds rule: judge how far the path stays inside the area's edges, above its floor and below its ceiling."""
 
 import math
 
@@ -18,13 +18,16 @@ from world.arrays import Floats
 def bounds_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum distance from the area's edges, floor and ceiling, with one finding."""
+    """Judge with one finding the minimum distance inside the area's edges, floor and ceiling.
+
+    The finding is not judged for a mission without a scenario, which has no area.
+    """
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
     planned_margin, edge, row = _min_distance_inside(requirements, requirements.points)
-    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint(row))}"
+    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint_place(row))}"
     ok: bool | None = planned_margin >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:

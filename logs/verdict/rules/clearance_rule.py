@@ -48,7 +48,7 @@ def clearance_findings(
 ) -> list[Finding]:
     """Judge the minimum height above ground on each leg, except on a landing that another rule judges.
 
-    Without terrain data, one undecided finding states that the legs are not judged.  A further finding reports a
+    Without terrain data, a single unjudged finding stands for all legs.  A further, undecided finding reports a
     doubtful altitude of home.
     """
     terrain = requirements.setup.scenario.terrain
@@ -118,15 +118,15 @@ def clearance_findings(
 
 
 def _geographic_text(requirements: RouteRequirements, east: float, north: float) -> str:
-    """Return the latitude and longitude of a map position, m, in brackets."""
+    """Return the latitude and longitude of a map position (m) as a text in brackets."""
     lat, lon = to_geo(requirements.setup.scenario.origin, east, north)
     return f" (latitude {float(lat):.5f}, longitude {float(lon):.5f})"
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Return an undecided finding if a waypoint is clearly below home, otherwise [].
+    """Return an undecided finding if a waypoint is more than `BELOW_HOME_M` below home, otherwise [].
 
-    Call this without terrain data: nothing then shows that the ground is lower than home.
+    It is made only without terrain data: nothing then shows that the ground there is lower than home.
     """
     home = requirements.setup.mission.home
     if home is None:
@@ -135,7 +135,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     k = int(np.argmax(depths))
     if not float(depths[k]) > BELOW_HOME_M:
         return []
-    lowest_waypoint = requirements.waypoint(k)
+    lowest_waypoint = requirements.waypoint_place(k)
     brief = f"waypoint {lowest_waypoint.number} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
     fault = message(
         brief, "; no terrain data confirms that the ground there is so low. Name an elevation file with --terrain"
@@ -162,12 +162,12 @@ class _Requirement(NamedTuple):
         return requirement
 
     def worst_height(self, heights: Floats, points: Floats) -> tuple[float, float]:
-        """Return the height above ground with the smallest margin, and the height required there, m.
+        """Return the height above ground with the smallest margin, m, and the height required there, m.
+
+        The returned height is NaN, and the requirement `limit`, if no height is known.
 
         heights: heights above ground at `points`, m, (n,).
         points: positions, m, (n, 3).
-
-        The returned height is NaN if no height is known.
         """
         if not np.isfinite(heights).any():
             return math.nan, self.limit
@@ -175,7 +175,10 @@ class _Requirement(NamedTuple):
         return float(heights[k]), requirement
 
     def smallest_margin(self, heights: Floats, points: Floats) -> tuple[int, float]:
-        """Return the index of the height with the smallest margin, and the height required there, m."""
+        """Return the index of the height with the smallest margin, and the height required there, m.
+
+        heights, points: as in `worst_height`, with at least one known height.
+        """
         if not self.fields:
             return int(np.nanargmin(heights)), self.limit
         requirement = self.required_heights(points)
@@ -199,7 +202,7 @@ class _Landing(NamedTuple):
 
 
 def _find_landing(requirements: RouteRequirements) -> _Landing | None:
-    """Return the landing of a mission; None without a landing or without planned ground phases.
+    """Return the landing of a mission; None without a landing, or for one whose path to the ground is not judged.
 
     Without a `[landing]` in the scenario, a simulated flight ends in the air over the landing point.  This rule then
     leaves the descent to the rules `landing` and `approach`.  In an imported log, the descent ends on the ground.
@@ -221,11 +224,12 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
 def _fields_by_leg(
     requirements: RouteRequirements, landing: _Landing | None
 ) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return the places near which each leg may be lower, by leg number: home or the landing point.
+    """Return, by leg, the positions near which the leg may be lower: home, the landing point or both.
 
-    A position is (east, north), m.  The legs of a flown or logged take-off have the position of home.  The final
-    approach has the landing point.  So have earlier legs of the landing, from the last waypoint that keeps the full
-    required height.  A landing begins at DO_LAND_START, or without this item one leg before the final approach.
+    A position is (east, north), m; other legs have no entry.  The legs of a flown or logged take-off have the position
+    of home.  The final approach has the landing point.  So have earlier legs of the landing, from the last waypoint
+    that keeps the full required height.  A landing begins at DO_LAND_START, or without this item one leg before the
+    final approach.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     procedures = setup.ground_phases if ground is None else ground.procedures
@@ -262,7 +266,7 @@ def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float]
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
-    """Name the source of a required height above ground, m; near home and landing point it is lower."""
+    """Return the source of a required height above ground (m): "near the field" if it is below the usual limit."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
@@ -300,7 +304,7 @@ def _planned_finding(
     known_height = math.nan if is_unknown else planned_height
     return make_finding(
         "clearance",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=None if is_unknown else not is_short,
         reason=reason,
         faults=[_placed_message(requirements, leg, off_text)] if is_unknown else [],
@@ -325,8 +329,9 @@ def _flown_finding(
     *,
     is_planned_short: bool,
 ) -> Finding:
-    """Judge the minimum height above ground on a flown leg; `planned_height` (m) is only reported.
+    """Judge the minimum height above ground on a flown leg; the finding is not judged if the leg was not flown.
 
+    planned_height: minimum height above ground of the planned path, m, which is only reported.
     is_planned_short: True if the planned path is lower than required.
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
@@ -368,7 +373,7 @@ def _flown_finding(
         reason += f"; the planned path descends to {_height_text(planned_height)}"
     return make_finding(
         "clearance",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=reason,
         faults=[_placed_message(requirements, leg, off_text)] if is_unknown else [],
@@ -399,7 +404,7 @@ def _height_text(clearance: float) -> str:
 
 def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Message:
     """Return a message that begins with the name of a leg."""
-    return message(f"{place_text(requirements.leg(leg))} {text}", placed=True)
+    return message(f"{place_text(requirements.leg_place(leg))} {text}", placed=True)
 
 
 def _time_and_place_text(aligned: AlignedTrack, segment: int, fraction: float) -> str:

@@ -22,8 +22,8 @@ from flight.mission.placing import HOME_ALTITUDE_TOLERANCE_M, SAME_POSITION_DIST
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
-    first_hazard_on_path,
     has_ground_paths,
+    hazard_on_path,
     landing_item,
     min_path_clearance,
     straight_path,
@@ -92,9 +92,10 @@ class _Obstacles(NamedTuple):
 
 
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, altitude: float) -> tuple[float, float]:
-    """Return the nominal and the certain maximum climb slope on a course, m per m.
+    """Return the nominal and the certain maximum climb slope on a course at a leg's airspeed, m per m.
 
     The certain slope is the nominal slope reduced by the uncertainty of the aircraft's model.
+
     course: rad.
     altitude: m AMSL.
     """
@@ -126,7 +127,7 @@ def climbout_findings(
     start = (float(east), float(north))
     first_waypoint, takeoff = takeoff_item(requirements.setup)
     first_point, ground_altitude = requirements.points[first_waypoint], float(terrain.height(*start))
-    place = requirements.waypoint(first_waypoint)
+    place = requirements.waypoint_place(first_waypoint)
     if takeoff is not None:
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
@@ -233,7 +234,7 @@ def _take_off_climb(
     altitudes: tuple[float, float],
     slope: float,
 ) -> _Climb:
-    """Return the take-off climb with a given slope (m per m).
+    """Lay out the take-off climb with a given slope (m per m), and find the obstacles on it.
 
     start: east and north of home, m.
     altitudes: altitudes of the ground at home and of the end of the take-off, m AMSL.
@@ -251,12 +252,12 @@ def _take_off_climb(
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
-    """Return the obstacles on a path from home.
+    """Find the obstacles on a path from home.
 
-    Height above ground is not checked on the first `LAUNCH_RUN_M`.
+    The height above ground is not checked on the first `LAUNCH_RUN_M`; it is inf on a path that is no longer.
     """
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
-    entered_hazard = first_hazard_on_path(requirements, path)
+    entered_hazard = hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
         return _Obstacles(clearance=math.inf, distance=0.0, entered_hazard=entered_hazard)
     return _Obstacles(*min_path_clearance(terrain, path.between(LAUNCH_RUN_M, end)), entered_hazard)
@@ -294,7 +295,7 @@ def _launch_finding(
     start: launch position (east, north, m), its ground altitude and the altitude at the end of the climb (m AMSL).
     certain_slope: steepest climb reduced by the uncertainty of the aircraft's model, m per m.
     """
-    to_item, obstacles = requirements.leg(0).to_item, steepest.obstacles
+    to_item, obstacles = requirements.leg_place(0).to_item, steepest.obstacles
     item_text = "the next waypoint" if to_item is None else f"item {to_item}"
     direction_text = launch.course_text or f"towards {item_text}"
     subject = f"the climb from home {direction_text}"
@@ -362,7 +363,11 @@ def _degrees_text(slope: float) -> str:
 def _clear_courses_text(
     requirements: RouteRequirements, home_position: tuple[float, float], ground_altitude: float, top_altitude: float
 ) -> str:
-    """Describe the widest range of launch courses on which the climb is clear of obstacles."""
+    """Describe the widest range of launch courses on which the steepest climb is clear of obstacles.
+
+    home_position: east and north, m.
+    ground_altitude, top_altitude: altitudes of the ground at home and of the end of the climb, m AMSL.
+    """
 
     def is_clear(course: float) -> bool:
         """Return True if a launch on a course (rad) climbs to the take-off's altitude without obstacles."""
@@ -415,7 +420,7 @@ def approach_findings(
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
     waypoint, leg = landing[0], landing[0] - 1
-    place, item_text = requirements.waypoint(waypoint), _item_text(requirements.waypoint(waypoint))
+    place, item_text = requirements.waypoint_place(waypoint), _item_text(requirements.waypoint_place(waypoint))
     glide_start, landing_point = requirements.straight_start(leg), requirements.points[waypoint]
     length, course = requirements.straight_length(leg), float(requirements.courses[leg])
     start_altitude, point_altitude = float(glide_start[2]), setup.route.landing_ground
@@ -437,7 +442,7 @@ def approach_findings(
     end, clearance, position = length - EARLY_TOUCHDOWN_DISTANCE_M, math.inf, 0.0
     if end > 0.0:
         clearance, position = min_path_clearance(terrain, path.between(0.0, end))
-    obstacles = _Obstacles(clearance, length - position, first_hazard_on_path(requirements, path))
+    obstacles = _Obstacles(clearance, length - position, hazard_on_path(requirements, path))
     subject = f"the glide to {item_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         return [
@@ -504,9 +509,10 @@ def _clearance_text(obstacles: _Obstacles) -> str:
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
-    """Make the finding on the clearance of a climb-out or an approach above ground.
+    """Make the finding on a climb-out or an approach, with its height above ground as the number.
 
-    ok: None if undecided.
+    rule: "climbout" or "approach".
+    ok: None if the finding is not judged.
     outcome: message with the reason; it is a fault unless the finding passes.
     check: see `logs.verdict.findings.Finding`.
     """

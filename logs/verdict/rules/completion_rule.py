@@ -20,7 +20,11 @@ from world.wording import count_text
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge whether a feasible plan was flown to its last waypoint, with a complete log."""
+    """Judge with one finding whether a feasible plan was flown to its last waypoint, with a complete log.
+
+    end_reason: "completed", or the reason why the flight ended early.
+    log_complete: True if the log is not cut off.
+    """
     plan = requirements.setup.plan
     faults = []
     if plan is not None and plan.failures:
@@ -29,7 +33,9 @@ def completion_findings(
         ending_place = ""
         if aligned is not None and not aligned.passed[-1]:
             row = len(aligned.track) - 1
-            ending_place = f" on {place_text(requirements.leg(aligned.leg_at(row)))}, {aligned.position_text(row)}"
+            ending_place = (
+                f" on {place_text(requirements.leg_place(aligned.leg_at(row)))}, {aligned.position_text(row)}"
+            )
         faults.append(message(f"the flight ended early: {end_reason}", ending_place))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
@@ -41,7 +47,7 @@ def completion_findings(
         # A leg counts as flown only once its loiter is complete.
         flown_count = leg_count - len(set(leg_numbers[~aligned.passed[1:]].tolist()))
         if flown_count < leg_count:
-            first_unflown = place_text(requirements.leg(int(np.argmin(aligned.passed[1:]))))
+            first_unflown = place_text(requirements.leg_place(int(np.argmin(aligned.passed[1:]))))
             unflown_text = f"; the first leg that was not flown to its end is {first_unflown}"
             faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown", unflown_text))
         # A long gap between the log's rows, and positions that contradict the velocities, are faults, too.
@@ -90,7 +96,11 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; undecided if the log may lack a part of it."""
+    """Judge whether an imported flight completed its mission; not judged if the log may lack a part of the flight.
+
+    stretches: legs that were flown in each stretch of the log.
+    log_complete: True if planfly's own log of the flight is not cut off.
+    """
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))
@@ -164,9 +174,9 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
 def _unflown_legs(
     setup: FlightSetup, flown_stretches: Sequence[FlownLegs], flown_legs: set[int]
 ) -> tuple[list[int], list[str]]:
-    """Return the legs that were certainly not flown, and texts on legs not recorded or flown only in part.
+    """Return the legs that were certainly not flown, and texts on legs that were not recorded or only partly flown.
 
-    flown_legs: numbers of the legs that were flown completely.
+    flown_legs: indices of the legs that were flown completely.
     """
     unflown_legs = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
     begins_in_flight = setup.imported_log is not None and setup.imported_log.begins_in_flight
@@ -198,7 +208,10 @@ def _gap_notes(flown_stretches: Sequence[FlownLegs]) -> list[str]:
 
 
 def _leg_numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
-    """Return the sorted numbers of legs as used in messages; all legs of a loiter share one number."""
+    """Return the sorted numbers by which messages name legs; all legs of a loiter share one number.
+
+    legs: indices in the route.
+    """
     return sorted({int(setup.route.leg_numbers[leg]) for leg in legs})
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from logs.verdict.findings import Finding, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
+from logs.verdict.measures.acceptance import corridor_limit, farthest_from_legs, turn_deviations
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, project_onto_leg
 from logs.verdict.rule import Rule
@@ -29,9 +29,9 @@ def corridor_findings(
 
 
 def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    """Judge the greatest distance of the flight, or of the planned turns if ``geometric``, from a leg."""
+    """Judge the largest distance of one leg's flown track, or of its planned turns if ``geometric``, from the legs."""
     limit, source = corridor_limit(requirements, leg)
-    planned_distance, flown_distance, ok = float(corner_depths(requirements, leg).max()), math.nan, None
+    planned_distance, flown_distance, ok = float(turn_deviations(requirements, leg).max()), math.nan, None
     faults, facts = [], []
     if geometric:
         ok = planned_distance <= limit + ROUNDING_M
@@ -69,7 +69,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
             )
     return make_finding(
         "corridor",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=finding_reason(faults) if faults else finding_reason([], facts),
         faults=faults,

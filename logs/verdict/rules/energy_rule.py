@@ -1,4 +1,4 @@
-"""The energy rule: compare the energy from battery or tank, predicted and flown, with the usable energy."""
+"""The energy rule: compare the energy that the flight uses, predicted and flown, with the usable energy."""
 
 import math
 from contextlib import suppress
@@ -18,7 +18,7 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.return_time import longest_return_time, remaining_time
+from logs.verdict.measures.return_time import longest_return_time, remaining_battery_time
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     leg_energies,
@@ -51,10 +51,10 @@ GUESSED_BATTERY_TEXT = (
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Compare the energy used with the battery's energy without its reserve.
+    """Compare the energy used with the energy in battery or tank less the reserve.
 
-    If a battery failsafe acts earlier, it sets the limit.  A mission with an endless jump fails.  The finding is
-    undecided if the capacity is a guess, if the power is unknown or too uncertain, or if a failsafe may act.
+    If a battery failsafe acts earlier, it sets the limit.  A mission with an endless jump fails.  The finding is not
+    judged if the capacity is a guess, if the power is unknown or too uncertain, or if a failsafe may act.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -121,8 +121,8 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     """Return the usable energy (Wh), the source of this limit, and a clause on a battery failsafe.
 
     The usable energy is the energy without the reserve, or less if a failsafe acts before the reserve is reached; the
-    clause describes this failsafe and is "" otherwise.  The failsafes of several batteries set no
-    limit, because the charge drawn from each battery is unknown.
+    clause describes this failsafe and is "" otherwise.  The failsafes of several batteries set no limit, because the
+    charge drawn from each battery is unknown.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
@@ -144,7 +144,7 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
-    """Report an endless jump as a fault, with the rounds that the energy permits; [] without one.
+    """Return one fault on an endless jump, with the number of rounds that the energy permits; [] without such a jump.
 
     A round is one repetition of the items between the jump and its destination.
     usable_energy: energy without the reserve, Wh.
@@ -208,7 +208,7 @@ class _FailsafeMessages(NamedTuple):
 def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float) -> _FailsafeMessages:
     """Judge whether a battery failsafe aborts the mission; return no messages for an imported flight.
 
-    energy_used: energy of the flight, Wh; NaN if unknown, and then no failsafe is judged.
+    energy_used: energy that the flight uses, Wh; NaN if unknown, and then no failsafe is judged.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
     messages, unjudged = _FailsafeMessages([], []), []
@@ -247,7 +247,7 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
         # The battery's remaining time may trigger an early return.  It is shortest at the end of the mission, and is
         # compared with the time of the longest return, so that the result holds at all times of the mission.
         factor = math.exp(UNDECIDED_FRACTION * setup.envelope.power_sd)
-        remaining = remaining_time(requirements, return_failsafe, factor * energy_used, factor)
+        remaining = remaining_battery_time(requirements, return_failsafe, factor * energy_used, factor)
         return_time = longest_return_time(requirements, return_failsafe)
         needed = return_failsafe.time_factor * return_time + return_failsafe.time_margin
         reason = (
@@ -264,8 +264,10 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:
-    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an engine.
+    """Describe the energy used and the peak current, or the fuel used by an engine.
 
+    energy_used: Wh.
+    max_current: A; NaN if unknown.
     is_empty: True if the battery or the tank is empty at the end of the flight.
     """
     capacity, envelope = requirements.setup.battery, requirements.setup.envelope

@@ -1,4 +1,4 @@
-"""The fence rule: judge how deep planned path and flight are inside exclusion zones or outside inclusion zones.
+"""The fence rule: judge how far planned path and flight are inside exclusion zones or outside inclusion zones.
 
 The zones are those of the scenario and of the mission's own fence.  The rule judges the path's line, including arcs,
 loiters and jumps; it only reports a corridor that reaches into a zone.
@@ -18,7 +18,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import suggest_passing_zone
+from logs.verdict.suggestions import suggest_shift_past_zone
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import ZoneRecords, zone_records
@@ -29,7 +29,7 @@ _METHOD = "every point of the path's straight segments and arcs, and of the segm
 
 
 def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Return a test of zones: True if the setup's path violates a zone by more than `ROUNDING_M`.
+    """Return a function that tests if the setup's planned path violates a zone by more than `ROUNDING_M`.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -51,7 +51,8 @@ def fence_findings(
 ) -> list[Finding]:
     """Judge each zone that the planned path or the flight touches; return [] without zones.
 
-    If no zone is violated, the first finding states this.
+    If no zone is violated, a finding before these states this.  A fence that cannot be converted to zones has an
+    unjudged finding.
     """
     airspace = requirements.airspace
     findings = []
@@ -97,9 +98,9 @@ def fence_findings(
 def _compliance_finding(
     requirements: RouteRequirements, planned_visits: Records, flown_visits: Records | None, moves: Records
 ) -> Finding:
-    """Return the finding that no judged zone is violated, with the distance to the nearest zone.
+    """Make the finding that no judged zone is violated, with the distance to the nearest zone.
 
-    It names all zones that the flight, or the planned path if nothing was flown, passes within the navigation error.
+    It names all zones that the judged path passes within the navigation error.
 
     planned_visits, flown_visits: one record of `logs.verdict.measures.zone_visits.VISIT` for each zone.
     moves: the judged path, of dtype `logs.verdict.measures.path_moves.MOVE`.
@@ -228,7 +229,7 @@ def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> s
     event: "entry" or "exit" of the violation, or "at" for its deepest point or, without a violation, for the point
         that is closest to one.
     """
-    leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
+    leg = place_text(requirements.leg_place(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s on {leg}, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL"
 
@@ -237,6 +238,6 @@ RULE = Rule(
     name="fence",
     tolerances=("ROUNDING_M",),
     judge=fence_findings,
-    suggest=suggest_passing_zone,
+    suggest=suggest_shift_past_zone,
     log=LogNeeds(("heights",)),
 )

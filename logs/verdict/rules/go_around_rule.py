@@ -2,8 +2,9 @@
 
 A go-around is not an item of the mission; it can be commanded anywhere on the glide.  The rule therefore simulates it
 from several places on the glide that the autopilot lays out, with the simulated ArduPlane on a point mass
-(`flight.autopilots.arduplane.go_around_point_mass`), back to the last waypoint before the glide, and judges the
-simulated path.  A go-around that never gets back fails; one whose path is not fully known is undecided.  The aircraft
+(`flight.autopilots.arduplane.go_around_point_mass`), back to a landing sequence or to the last waypoint before the
+glide, and judges the simulated path.  A go-around that never gets back there is a fault, as is one that meets an
+obstacle; a go-around whose path is not fully known is not judged.  The aircraft
 climbs on the landing course to a height above home, regardless of the altitude of the field, and only then turns.  From
 a field higher than home it may therefore turn into a hill at once.
 """
@@ -26,8 +27,8 @@ from flight.mission.return_path import LandingStart
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
-    first_hazard_on_path,
     has_ground_paths,
+    hazard_on_path,
     landing_item,
     takeoff_item,
 )
@@ -159,11 +160,11 @@ class _GoAround(NamedTuple):
 def go_around_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the go-around of a mission that lands and has a home.
+    """Judge the go-around of a mission that lands and has a home, with one finding.
 
-    If the scenario requires go-arounds, a faulty go-around fails, and an unjudged go-around leaves the verdict
+    If the scenario requires go-arounds, a fault fails the finding, and an unjudged go-around leaves the verdict
     undecided.  Otherwise, a fault is only a warning.  Return [] if there is nothing to judge and go-arounds are not
-    required.
+    required, and for an imported flight.
     """
     requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
     setup = requirements.setup
@@ -189,7 +190,7 @@ def go_around_findings(
 def _find_landing(
     requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem
 ) -> _Landing | None:
-    """Return the landing at a waypoint, with the glide to it and the climb of its go-around.
+    """Return the landing at a waypoint, with the glide to it and the climb of a go-around from it.
 
     Return None if the climb height of its go-around, home's altitude or the ground at the landing is unknown, and if
     the glide to the waypoint is too short or does not descend.
@@ -249,8 +250,11 @@ def _find_landing(
 def _go_around_finding(
     requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
 ) -> Finding:
-    """Simulate go-arounds from positions on the glide, and judge the worst; it fails only if required."""
-    setup, place, height = requirements.setup, requirements.waypoint(landing.waypoint), landing.climb_height
+    """Simulate go-arounds from positions on the glide, and judge the worst of them.
+
+    is_required: True if a fault fails the finding; False if it is only a warning.
+    """
+    setup, place, height = requirements.setup, requirements.waypoint_place(landing.waypoint), landing.climb_height
     climb_text = (
         f"the aircraft climbs to {height:.0f} m above home,"
         f" {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
@@ -423,7 +427,7 @@ def _judge_go_around(
     path = GroundPath(positions, np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]))
     heights = path_clearance(terrain.heights, terrain.to_pixel.record, positions)[0]
     min_height = float(np.nanmin(heights, initial=math.inf))
-    go_around = go_around._replace(entered_hazard=first_hazard_on_path(requirements, path))
+    go_around = go_around._replace(entered_hazard=hazard_on_path(requirements, path))
     if end_status == RETURN_GROUND_IMPACT or min_height <= 0.0:
         return go_around._replace(lowest_height=min(min_height, 0.0), impact_time=float(result["clearance_time"]))
     landing_direction = math.sin(landing.course), math.cos(landing.course)
@@ -437,7 +441,7 @@ def _judge_go_around(
         go_around = go_around._replace(
             unknown_part_text=f"{passing_text}; the flight may be {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
         )
-    # On the path back, the required height is that of the destination near one that is lower.
+    # Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, its height is the required height.
     middles = (0.5 * (positions[:-1] + positions[1:]))[climb_end:]
     required = np.full(len(middles), GO_AROUND_CLEARANCE_M)
     for east, north, up in (start.position for start in (destination, *destination.next_stops)):
@@ -458,7 +462,7 @@ def _judge_go_around(
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN for none.
+    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN if there is none.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.

@@ -24,7 +24,10 @@ from world.terrain import Terrain
 def height_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the maximum height above ground on each leg; return [] if the scenario has no limit."""
+    """Judge the maximum height above ground on each leg; return [] if the scenario has no limit.
+
+    Without terrain data, a single unjudged finding stands for all legs.
+    """
     scenario = requirements.setup.scenario
     limit, terrain = scenario.limits.max_height_m, scenario.terrain
     if limit is None:
@@ -58,13 +61,12 @@ def height_findings(
 
 
 def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's maximum height above ground (m) and its place, (n - 1,) each.
+    """Return each segment's maximum height above ground, m, and the fraction of the segment at which it occurs.
 
-    The place is a fraction of the segment.
+    Both have shape (n - 1,).  The height is exact for ground that is interpolated bilinearly, and NaN if a segment
+    leaves the terrain data.  It is computed as a minimum height, with path and ground turned upside down.
+
     points: ends of the segments as east, north and up, m, (n, 3).
-
-    The height is exact for ground that is interpolated bilinearly; NaN if a segment leaves the terrain data.  It is
-    computed as a minimum height, with path and ground turned upside down.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     inverted_heights, fraction = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
@@ -89,8 +91,10 @@ class _Path:
 
 @dataclass(frozen=True, slots=True)
 class _LegMaxima:
-    """Maximum height of a leg above ground, NaN if unknown, and maximum altitude AMSL, m.
+    """Maxima of a leg's path.
 
+    height: maximum height above ground, m; NaN if unknown.
+    amsl: maximum altitude, m AMSL.
     time_and_place: text with the time and place of the maximum height.
     is_ground_known: True if the ground is known along the whole leg.
     """
@@ -104,8 +108,9 @@ class _LegMaxima:
 def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
     """Return the maximum height above ground and the maximum altitude on segments; None without segments.
 
-    segments: indices of segments of the path, (k,).
     The height is NaN if the ground is unknown below all segments.
+
+    segments: indices of segments of the path, (k,).
     """
     if not segments.size:
         return None
@@ -162,7 +167,7 @@ def _leg_finding(
         facts.append(f"the planned path rises to {planned_maximum.height:.1f} m above ground")
     return make_finding(
         "height",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=finding_reason(faults, facts),
         faults=faults,

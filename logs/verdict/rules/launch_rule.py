@@ -1,9 +1,9 @@
 """The launch rule: judge a flown take-off, from rail, hand or runway to the start of the first leg.
 
-The rule compares the launch acceleration with the acceleration that starts the motor, and judges the height lost after
-the launch, the runway remaining at lift-off, and the hazards (ground, missile spheres and zones) to the climb on the
-course that the autopilot holds.  The take-off and climb-out rules judge a take-off that is not flown, from the
-mission's items.
+The rule compares the launch acceleration with the acceleration that starts the motor.  It judges the height lost after
+the launch, the runway left at lift-off, and the hazards on the climb (ground, missile spheres and zones) on the course
+that the autopilot holds.  A take-off that is not flown is judged from the mission's items by the take-off and climb-out
+rules.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from flight.mission.ground_phases import TakeOff
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, finding_reason, make_finding, message
-from logs.verdict.measures.ground_paths import GroundPath, first_hazard_on_path, min_path_clearance, track_path
+from logs.verdict.measures.ground_paths import GroundPath, hazard_on_path, min_path_clearance, track_path
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import Rule
@@ -36,12 +36,13 @@ def launch_findings(
 ) -> list[Finding]:
     """Judge a flown take-off with one finding; return [] if no take-off was flown.
 
-    It is judged by its motor start, height reached and lost, runway, ground clearance and hazards.
+    The finding covers the start of the motor, the height reached, the height lost after the launch, the runway left,
+    and hazards on the climb.
     """
     ground, terrain = requirements.ground_phases, requirements.setup.scenario.terrain
     if ground is None or ground.procedures.take_off is None:
         return []
-    take_off, track = ground.procedures.take_off, ground.launch
+    take_off, track = ground.procedures.take_off, ground.takeoff_track
     position, distances = path = track_path(track)
     height_lost = float(position[0, 2] - position[:, 2].min())
     clearance, distance = _climb_clearance(requirements, path)
@@ -75,7 +76,7 @@ def launch_findings(
         place_text = f" {distance:.0f} m from home on the flown course; {LAUNCH_CLEARANCE_M:g} m are required"
         side = "above" if clearance >= 0.0 else "below"
         faults.append(message(f"{abs(clearance):.1f} m {side} ground", place_text))
-    entered_hazard = first_hazard_on_path(requirements, path)
+    entered_hazard = hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
     notes = _describe_take_off(take_off, track, distances, clearance, terrain)
@@ -92,7 +93,7 @@ def launch_findings(
     return [
         make_finding(
             "launch",
-            requirements.waypoint(take_off.waypoint),
+            requirements.waypoint_place(take_off.waypoint),
             ok=False if faults else None if undecided_messages else True,
             reason=finding_reason(faults or undecided_messages, notes),
             faults=faults or undecided_messages,
@@ -111,9 +112,10 @@ def launch_findings(
 
 
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
-    """Return the minimum height above ground after the launch run, m, and its distance along the path, m.
+    """Return the minimum height above ground after the launch run, m, and the distance along the path there, m.
 
-    The height is inf if the take-off ends within the launch run, and NaN without terrain.  The distance is then NaN.
+    The launch run is the first `LAUNCH_RUN_M`, or on a runway all of the path up to lift-off if that is longer.  The
+    height is inf if the take-off ends within it, and NaN without terrain; the distance is then NaN.
     """
     terrain, (position, distances) = requirements.setup.scenario.terrain, path
     if terrain is None:

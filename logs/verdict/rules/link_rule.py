@@ -1,7 +1,7 @@
 """The link rule: judge the radio link between the ground station and the aircraft along the path.
 
-The link fails where less than the fade margin is left for longer than the scenario accepts, or for as long as the
-autopilot needs to notice the loss and leave the mission.
+The link fails if it is below the fade margin for longer than the scenario accepts, or for so long that the autopilot
+notices the loss and leaves the mission.
 """
 
 import math
@@ -20,14 +20,14 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.returns.judge_returns import FlyAgain, Returns, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import flown_starts, planned_starts
-from logs.verdict.returns.returns_text import ACTION_TEXTS, headline
+from logs.verdict.returns.returns_text import ACTION_TEXTS, returns_headline
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.errors import MissionError
 from world.radio import RadioLink
 
-# Greatest number of simulated returns during all outages.  Up to this number, one begins each second of an outage.
+# Greatest number of simulated returns to launch in all outages together.  Up to this number, one begins each second.
 _MAX_RETURNS = 3000
 # Durations below this are printed to a tenth of a second, s.
 _SHORT_OUTAGE_S = 10.0
@@ -44,7 +44,8 @@ class JudgedLink:
     along: the link along the judged path; None if it cannot be computed.
     antenna: position of the station's antenna, m, (3,); None if `along` is None.
     leg: leg with the smallest margin; None if no margin is known.
-    returns: returns with which the autopilot reacts to the outages; None if it notices no outage or does not return.
+    returns: returns to launch with which the autopilot reacts to the outages; None if it notices no outage, does not
+        return, or has no home to return to.
     """
 
     finding: Finding
@@ -72,8 +73,8 @@ def judge_link(
 ) -> JudgedLink:
     """Judge a radio link along the planned path if `geometric`, otherwise along the whole flown track.
 
-    fly_again: function that flies an uncertain return again in JSBSim, as for `judge_returns`; None for no such
-    flights.
+    fly_again: function that flies an uncertain return to launch again in JSBSim, as for `judge_returns`; None for no
+        such flights.
     """
     phases = requirements.ground_phases
     whole_requirements = requirements if phases is None else phases.whole_route
@@ -118,13 +119,17 @@ def judge_link(
         ]
         reaction_text = f". If the link is lost, {setup.autopilot.title} {', then '.join(action_texts)}"
         if returns is not None:
-            reaction_text += f": {headline(returns)}"
+            reaction_text += f": {returns_headline(returns)}"
         elif any(reaction.action == "return" for reaction in reactions):
             reaction_text += ": not judged, because the mission has no home"
     elif judged_link.outages and not reactions:
         setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
         reaction_text = f". If the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
-    leg = None if judged_link.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged_link)
+    leg = (
+        None
+        if judged_link.worst_point < 0
+        else _worst_leg(requirements, aligned if not geometric else None, judged_link)
+    )
     text = _link_text(judged_link, leg)
     finding = _link_finding(
         link, (planned, judged_link), outages, reactions, (text, reaction_text), geometric=geometric
@@ -171,11 +176,13 @@ def _judge_reaction_returns(
     reactions: Sequence[LinkLossReaction],
     fly_again: FlyAgain | None,
 ) -> Returns | None:
-    """Judge the returns that begin during an outage after the autopilot has noticed it.
+    """Simulate and judge the returns to launch that begin in outages, from the time when the autopilot notices them.
 
-    Return None if no reaction is a return, or for a mission without a home.
+    Return None if the autopilot does not react with a return, or for a mission without a home.
 
-    track: None for the planned path.
+    track: flown track; None for the planned path.
+    reactions: reactions to a loss of the link, in order of time.
+    fly_again: as for `judge_link`.
     """
     if not any(reaction.action == "return" for reaction in reactions):
         return None
@@ -201,11 +208,11 @@ def _judge_reaction_returns(
 
 
 def _link_text(link_along_path: LinkAlongPath, leg: Place | None) -> str:
-    """Describe the smallest margin of the link, the outages, and the place of the smallest margin.
+    """Describe the smallest margin of the link, the outages, and the place and time of the smallest margin.
 
     leg: leg of the smallest margin; None if no margin is known.
     """
-    k = link_along_path.worst
+    k = link_along_path.worst_point
     if leg is None:
         return "the terrain below the radio path is unknown"
     points, (east, north) = link_along_path.points, link_along_path.positions[k, :2].tolist()
@@ -256,15 +263,15 @@ def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, li
 
     aligned: flown track; None for the planned path.
     """
-    time, phases = float(link_along_path.time[link_along_path.worst]), requirements.ground_phases
+    time, phases = float(link_along_path.time[link_along_path.worst_point]), requirements.ground_phases
     if aligned is None:
         path = requirements.path
         segment = int(np.searchsorted(path.times, time, side="right")) - 1
-        return requirements.leg(int(path.legs[min(max(segment, 0), len(path.legs) - 1)]))
+        return requirements.leg_place(int(path.legs[min(max(segment, 0), len(path.legs) - 1)]))
     approach = None if phases is None else phases.procedures.approach
     if phases is not None and approach is not None and time > phases.track.time[phases.landing_start_row]:
-        return phases.whole_route.leg(approach.leg)
-    return requirements.leg(aligned.leg_at(int(np.searchsorted(aligned.track.time, time))))
+        return phases.whole_route.leg_place(approach.leg)
+    return requirements.leg_place(aligned.leg_at(int(np.searchsorted(aligned.track.time, time))))
 
 
 def _link_finding(
@@ -278,8 +285,9 @@ def _link_finding(
 ) -> Finding:
     """Judge the radio link along a path by its longest outage.
 
-    paths: link along the planned path and along the judged path; both are the planned path before a flight.
-    noticeable_outages: parts of the outages in which the autopilot reacts.
+    paths: link along the planned path, and along the judged path, which is the planned path if ``geometric``.
+    noticeable_outages: outages, without the part in which the autopilot ignores them.
+    reactions: reactions of the autopilot to a loss of the link, in order of time.
     texts: texts on the link, and on the reactions to its loss.
     """
     planned, judged = paths
@@ -292,9 +300,9 @@ def _link_finding(
     if ok and not judged.is_known:
         ok = None
     (text, reaction_text), points, facts = texts, judged.points, []
-    if judged.worst >= 0:
+    if judged.worst_point >= 0:
         facts = [
-            Fact("smallest margin left after the fade margin", float(points.margin[judged.worst]), "dB"),
+            Fact("smallest margin left after the fade margin", float(points.margin[judged.worst_point]), "dB"),
             Fact("time below the fade margin", judged.time_below_margin, "s"),
             Fact("greatest distance from the station", float(points.distance.max()), "m"),
             Fact("least clearance in radii of the first Fresnel zone", float(np.nanmin(points.fresnel_clearance)), ""),

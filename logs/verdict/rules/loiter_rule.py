@@ -1,4 +1,4 @@
-"""The loiter rule: judge whether a loiter can be held with this bank in this wind, and was flown to its end.
+"""The loiter rule: judge whether a loiter can be held within the bank limit in this wind, and was flown to its end.
 
 A loiter is flown as corners around its circle, each judged like any turn.  The findings on the corners of a loiter are
 merged into one, and each rule keeps only its worst finding on the legs between the corners.
@@ -91,7 +91,7 @@ def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
 def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Merge the findings on each loiter's corners, and keep each rule's worst finding on its legs."""
+    """Replace the findings on each loiter's corners by one, and keep each rule's worst finding on the loiter's legs."""
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -100,7 +100,7 @@ def merge_loiter_findings(
         positions.setdefault((finding.rule, finding.place), []).append(k)
 
     def remaining_findings(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
-        """Return, in order, index and finding of these rules at these places, without findings already merged."""
+        """Return index and finding for each finding of these rules at these places that is not merged yet, in order."""
         indices = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
@@ -110,7 +110,7 @@ def merge_loiter_findings(
         includes_end = joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
         last = circle.last + 1 if includes_end else circle.last
         corner_findings = remaining_findings(
-            ("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)]
+            ("turn", "waypoint"), [requirements.waypoint_place(i) for i in range(circle.first, last + 1)]
         )
         for k, _ in corner_findings:
             merged[k] = None
@@ -118,7 +118,7 @@ def merge_loiter_findings(
             merged[corner_findings[0][0]] = _loiter_finding(
                 requirements, aligned, circle, [finding for _, finding in corner_findings]
             )
-        legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
+        legs = [requirements.leg_place(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
             rule_findings = remaining_findings((rule,), legs)
             if joins_at_center and any(finding.ok is not None for _, finding in rule_findings):
@@ -147,7 +147,7 @@ def end_loiter_findings(
     if reach_and_hazards is None:
         return []
     reach, hazards = reach_and_hazards
-    title, place = requirements.setup.autopilot.title, requirements.waypoint(requirements.legs)
+    title, place = requirements.setup.autopilot.title, requirements.waypoint_place(requirements.legs)
     if not math.isfinite(reach):
         fault = message(
             f"{title} then circles here indefinitely, and the wind is too strong to fly a circle",
@@ -178,7 +178,7 @@ def end_loiter_findings(
 def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
-    """Judge one loiter by its radius and by the findings on its corners, which this finding replaces."""
+    """Judge one loiter by its radius, its laps, and the findings on its corners, which the new finding replaces."""
     # A flight that ended before a corner does not fail there: the completion rule judges the early end.
     corner_findings = [
         replace(finding, ok=None)
@@ -230,7 +230,7 @@ def _loiter_finding(
         facts += [judgement.hazards_text] if judgement.hazards_text else []
     return make_finding(
         "loiter",
-        requirements.waypoint(circle.first),
+        requirements.waypoint_place(circle.first),
         ok=ok,
         reason=finding_reason(faults, facts),
         faults=faults,
@@ -251,9 +251,9 @@ class _RadiusJudgement(NamedTuple):
     """Judgement of a loiter's radius.
 
     min_radius: smallest radius that the bank limit permits, m; NaN if the limit is unknown.
-    faults, facts: what the finding states about the radius and the laps.
+    faults, facts: messages and texts on the radius and the laps for the finding.
     check: `UNKNOWN_AIRCRAFT` or `UNKNOWN_PATH` if the radius cannot be judged, otherwise "".
-    hazards_text: hazards too close to a loiter that is flown wider than drawn; "" without hazards.
+    hazards_text: text on hazards within reach of a loiter that is flown wider than drawn; "" without hazards.
     """
 
     min_radius: float
@@ -324,9 +324,9 @@ def _corner_faults(
     *,
     has_faults: bool,
 ) -> list[Message]:
-    """Return at most one message on the failed corners of a loiter.
+    """Return one message on the failed corners of a loiter, or [] if there is nothing to report.
 
-    aligned: flown track; None for a plan, whose first failed corner is described.
+    aligned: flown track, whose worst failed corner is described; None for a plan, whose first failed corner is.
     has_faults: True if the loiter itself has a fault; planned corners are then not reported.
     """
     if not failed_corners or (aligned is None and has_faults):
@@ -344,15 +344,18 @@ def _corner_faults(
         ]
     finding = failed_corners[0]
     reason_text = f"{place_text(finding.place)}: {finding.reason}"
-    return [Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))]
+    return [
+        Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint_place(circle.first))
+    ]
 
 
 def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
     """Return the smallest radius that the bank limit permits for a loiter in this wind, m.
 
-    Only the courses of the loiter's arcs count.  An unlimited loiter has all courses, even if the route contains only
-    a part of a lap.
-    possible: True for the largest bank limit that the aircraft may have.
+    The wind is taken only on the courses of the loiter's arcs.  An unlimited loiter has all courses, even if the route
+    contains only a part of a lap.
+
+    possible: True for the largest bank limit that the aircraft may have, False for the setup's limit.
     """
     radii = requirements.possible_min_radius if possible else requirements.min_radius
     min_radius = float(radii[circle.first : circle.last + 1].max())
@@ -381,10 +384,10 @@ def _stated_loiter(requirements: RouteRequirements, circle: LoiterCircle) -> Loi
 def _measure_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle
 ) -> tuple[Floats, float]:
-    """Return the distances of the track's rows from a loiter's center, m, (n,), and the laps flown around it.
+    """Return the distances of the track's rows from a loiter's center, m, (n,), and the number of laps flown.
 
-    The distances are those from the first to the last corner, the laps those between the waypoints before and after the
-    loiter.  Without a flight that passed the last corner, the array is empty and the number NaN.  The number is also
+    The distances are taken between the first and the last corner, the laps between the waypoints before and after the
+    loiter.  Without a flight that passed the last corner, the array is empty and the number is NaN.  The number is also
     NaN if the autopilot follows the drawn corners instead of circling the center.
     """
     radii, laps = np.zeros(0), math.nan

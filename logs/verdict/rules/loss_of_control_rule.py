@@ -24,9 +24,9 @@ from world.wording import count_text
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge loss of control by unusable rows, maximum bank, minimum airspeed and ground contact.
+    """Judge with one finding if control was lost: unusable rows, extreme bank, low airspeed or ground contact.
 
-    Return [] before a flight.  Without usable rows, the finding is not judged.
+    Return [] if ``geometric``, because nothing was flown.  Without usable rows, the finding is not judged.
     """
     if geometric:
         return []
@@ -65,7 +65,7 @@ def departure_findings(
         time = track.time[k] + aligned.clearance_fraction[k] * (track.time[k + 1] - track.time[k])
         faults.append(
             message(
-                f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
+                f"ground contact at {time:.1f} s on {place_text(requirements.leg_place(aligned.leg_at(k)))}",
                 f", {aligned.position_text(k, float(aligned.clearance_fraction[k]))}",
             )
         )

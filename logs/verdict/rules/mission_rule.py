@@ -58,7 +58,11 @@ C = Command
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Run PX4's checks and planfly's own checks on a mission; each finding names the first item at fault."""
+    """Judge a mission's items by PX4's checks and planfly's own checks.
+
+    Each check has one finding, on the gravest of its remarks.  For ArduPlane, only failures of PX4's checks that hold
+    for every autopilot are reported.
+    """
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.checks.feasibility
     dialect = setup.autopilot.checks.dialect
     refuses = dialect == "px4"
@@ -142,10 +146,10 @@ _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:
-    """Report a waypoint inside the circle of a loiter, or two loiters without a common tangent.
+    """Return a finding on a waypoint inside the circle of a loiter, or on two loiters without a common tangent.
 
-    The path to such a waypoint or loiter is not constructed, so it is not judged.  For an imported flight the finding
-    is undecided: see `logs.verdict.rules.completion_rule.imported_completion_finding`.
+    The path to such a waypoint or loiter is not laid out, so it cannot be judged, and the finding fails.  For an
+    imported flight the finding is not judged: see `logs.verdict.rules.completion_rule.imported_completion_finding`.
     """
     first_stop, *other_stops = setup.route.unjoined_stops
     autopilot = setup.autopilot.title
@@ -178,7 +182,7 @@ _REENTRY_MARKS = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
 
 
 def _unreached_findings(setup: FlightSetup) -> list[Finding]:
-    """Report navigation items after the mission's end, which are never reached.
+    """Return a finding on navigation items after the mission's end, which are never reached, or [] without any.
 
     Items after a return to launch fail.  Items after a landing or an endless loiter are reached only if the pilot
     selects the next item, so they leave the verdict undecided.  Three kinds of items are not reported: items of a
@@ -219,7 +223,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
 
 
 def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
-    """Yield a finding for each item or setting that changes the flight path but is not simulated."""
+    """Yield an undecided finding for each item or setting that changes the flight path but is not simulated."""
     remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.checks.follows_terrain:
         items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.points["above_ground"])].tolist()))
@@ -330,7 +334,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:
-    """Return the items with a position to which PX4 flies."""
+    """Return the items to whose position PX4 flies: waypoints, loiters, take-offs and landings."""
     return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
 
 
@@ -348,8 +352,8 @@ _PX4_LOCATED_COMMANDS = frozenset(
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
     """Yield a remark on each item that PX4 refuses at upload.
 
-    refuses: True if PX4 is to fly.  Only then are commands without coordinates in a frame with coordinates reported,
-        because every file of Mission Planner contains such commands.
+    refuses: True if PX4 is to fly.  Only then are commands without coordinates reported that are in a frame with
+        coordinates, because every file of Mission Planner contains such commands.
     """
     for item in mission.items:
         name, support = command_name(item.command), command_support(item.command)
@@ -449,9 +453,11 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimi
 
 
 def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: bool) -> Iterator[_Remark]:
-    """Yield a remark if the mission lacks the take-off or landing that MIS_TKO_LAND_REQ requires.
+    """Yield one remark on the take-off and the landing that MIS_TKO_LAND_REQ requires.
 
     A missing item is refused only if the user's parameter file states the requirement.
+
+    refuses: True if PX4 is to fly.
     """
     missing_ends = missing_ends_text(mission, limits)
     if not missing_ends:
@@ -470,7 +476,7 @@ def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin
 
 
 def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield a remark if the first flown item is too far from home, or if the mission has no home."""
+    """Yield a remark if the first flown item is too far from home, or if there is no home or no flown item."""
     flown_items = _flown_items(mission)
     if mission.home is None or not flown_items:
         yield True, None, "no home, so no distance to the first waypoint"
@@ -488,7 +494,7 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates close to a waypoint, and on a distance that older PX4 releases refuse."""
+    """Yield remarks on gates too close to a waypoint, and one on the longest leg if older PX4 releases refuse it."""
     # Condition gates that are too close to the waypoint before or after the gate.
     flown_items = [
         item
@@ -517,7 +523,7 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
     """Yield a remark on each flown item below home.
 
-    If the file has no home, the check yields a remark on the first item with a height above home, and stops.
+    If the file has no home, the only remark is on the first item with a height above home.
     """
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
@@ -529,12 +535,15 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
-    """Yield a remark on each route point that violates the mission's own fence by PX4's test."""
+    """Yield a remark on each route point that violates the mission's own fence by PX4's test.
+
+    Without a fence, the only remark states this.  There is none if any of several inclusion zones suffices: the fence
+    rule then judges the flight against their union.
+    """
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return
     if setup.autopilot.checks.any_inclusion_suffices:
-        # The fence rule judges the flight against the union of the inclusion zones.
         return
     origin, route = setup.scenario.origin, setup.route
     for point, item in zip(route.positions, route.items, strict=True):

@@ -88,7 +88,7 @@ RULES: dict[str, Rule] = {name: next(rule for rule in _RULES if rule.name == nam
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return the findings of all rules that judge mission items."""
+    """Return the findings of all rules that judge a mission's items, without its path."""
     return [finding for rule in RULES.values() if rule.judge_items is not None for finding in rule.judge_items(setup)]
 
 
@@ -113,7 +113,7 @@ def run_rules(
     flight_findings: Sequence[Finding] | None = None,
     suggests: bool = False,
 ) -> tuple[Finding, ...]:
-    """Return the findings of all rules on a flown track or on a route, after the rules have merged them.
+    """Judge a flown track or a route by all rules, and return the findings after all merges.
 
     geometric: True to judge the route by its geometry; False to judge the flight and the mission's items.
     end_reason: "completed", or the reason why the flight ended early; None if the end of the flight is not judged.
@@ -146,7 +146,7 @@ def run_rules(
     merged = merged if geometric else (*blocking_item_findings(requirements.setup), *merged)
     if not suggests:
         return merged
-    return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
+    return_legs = {requirements.leg_place(i) for i in requirements.setup.route.rtl_legs}
     places = [k for k, finding in enumerate(merged) if _needs_suggestions(finding, return_legs)]
     results = list(merged)
     for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():
@@ -160,7 +160,7 @@ _POSITION_RULES = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return an undecided finding for each place that fails on only one side of a course reversal.
+    """Return an undecided finding for each place that fails if the aircraft reverses to one side, but not to the other.
 
     At a corner of 180 degrees the autopilot may turn left or right, so the route is judged for both directions.
     A flight shows only one direction, which depends on its navigation error: of 12 ArduPlane flights through a turn of
@@ -182,7 +182,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
         for side_requirements in (replace(requirements, ground_phases=None), other_side)
     ]
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
-    corners_text = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
+    corners_text = ", ".join(place_text(requirements.waypoint_place(int(i))) for i in corners)
     one_sided_findings = []
     for key in (failures_by_side[0].keys() ^ failures_by_side[1].keys()) - failed_keys:
         finding = failures_by_side[0].get(key) or failures_by_side[1][key]
@@ -195,7 +195,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
 
 
 def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep each rule's worst finding on the corners of each stop, and its worst on the legs to the stop.
+    """Keep each rule's worst finding on the corners of each stop, and its worst finding on the legs to the stop.
 
     A stop is a waypoint or a loiter of the mission; a loiter is flown as several corners and legs.
 
@@ -241,9 +241,9 @@ def _needs_suggestions(finding: Finding, return_legs: set[Place]) -> bool:
 def with_passing_suggestions(
     findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Replace the suggestions of each failed finding by those that passed their trials.
+    """Replace the suggestions of each failed finding by its suggestions that passed their trials.
 
-    trials: suggestions that passed their trials; None to keep all suggestions.
+    trials: suggestions that passed their trials, by rule and place; None to keep all suggestions.
 
     >>> from logs.verdict.places import Change, Place
     >>> higher = ((Change("height", Place("leg", 2), None, 12.0, "m"),),)

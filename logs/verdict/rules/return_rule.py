@@ -25,14 +25,14 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Change, Suggestion
 from logs.verdict.returns.glides_text import glides_headline
-from logs.verdict.returns.judge_glides import MARGIN, judge_glides
+from logs.verdict.returns.judge_glides import GLIDE_CLEARANCE_M, judge_glides
 from logs.verdict.returns.judge_returns import (
     UNJUDGED,
     ReturnWorld,
     heights_above_ground,
     judge_returns,
     make_return_world,
-    returning_title,
+    rtl_autopilot_title,
 )
 from logs.verdict.returns.return_starts import (
     ReturnStarts,
@@ -41,12 +41,13 @@ from logs.verdict.returns.return_starts import (
     return_start_at_path_end,
     return_start_at_track_end,
 )
-from logs.verdict.returns.returns_text import headline, measured_text, outcome_text
+from logs.verdict.returns.returns_text import measured_text, outcome_text, returns_headline
 from logs.verdict.rule import Rule
 from world.errors import MissionError
 from world.scenario_tables import ReturnDemand
 
-# Maximum number of simulated returns if all have to be safe: one for each second of flight, 2 ms each.
+# Maximum number of simulated returns to launch if the scenario requires all to be safe.  Up to this number, one begins
+# each second of flight; each takes 2 ms.
 _MAX_RETURNS = 3000
 # Rules that judge how well a flight follows its legs.
 _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
@@ -55,10 +56,11 @@ _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 def return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the destination of a planned RTL, and whether an imported flight completed its RTL.
+    """Judge the planned returns to launch, and whether an imported flight completed its RTL.
 
-    Flights simulated by planfly have no findings here: `flown_return_findings` judges them, because their track does
-    not show how they ended.
+    Planned are the mission's RTL, the RTL after its last item, and the returns that the scenario requires.  Flights
+    simulated by planfly have no findings here: `flown_return_findings` judges them, because their track does not show
+    how they ended.
     """
     if geometric:
         required_findings = _requirement_findings(
@@ -83,7 +85,7 @@ def return_findings(
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge a flight's RTL, the RTL after its last item, and the scenario's demands on returns.
+    """Judge a flight's RTL, the RTL after its last item, and the scenario's requirements on returns to launch.
 
     end_reason: "completed" if the flight ended after its RTL loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
@@ -107,12 +109,12 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
 
     Return [] if the mission ends in another way.
 
-    end: start of this return, at the end of the mission; None if the flight did not reach the end of the mission.
+    end: state at the end of the mission, from which this return starts; None if the flight did not reach it.
     """
     setup = requirements.setup
     if not judges_return_after_last_item(setup):
         return []
-    end_waypoint = requirements.waypoint(requirements.legs)
+    end_waypoint = requirements.waypoint_place(requirements.legs)
     if reason := missing_home_text(setup):
         return [make_finding("return", end_waypoint, ok=None, reason=reason, check=NO_HOME)]
     ok: bool | None = None
@@ -125,7 +127,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
         simulated = returns.each[0] if returns.each else None
         if simulated is None or simulated.target.landing is not None:
             brief = "the return after the last item is not judged"
-            text = f"{brief}: {headline(returns)}"
+            text = f"{brief}: {returns_headline(returns)}"
         else:
             brief = f"return after the last item ({outcome_text(simulated, world.limit)})"
             text = f"the return after the last item {measured_text(simulated, world.limit, setup.scenario)}"
@@ -142,14 +144,14 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
             ok=ok,
             reason=fault.text,
             faults=[] if ok else [fault],
-            method=_method_text(returning_title(setup)),
+            method=_method_text(rtl_autopilot_title(setup)),
             check=check,
         )
     ]
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge whether RTLs and glides meet the scenario's requirements; [] without requirements.
+    """Judge with one finding whether RTLs and glides meet the scenario's requirements; [] without requirements.
 
     starts: function that samples the starts of RTLs at an interval, s.
     """
@@ -165,7 +167,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     except MissionError as error:
         # Without a home no RTL is safe, and the places that a glide reaches are unknown.
         ok_without_home = False if "rtl" in requirement.require else None
-        answers = [_RequirementResult(ok_without_home, str(error), _method_text(returning_title(setup)))]
+        answers = [_RequirementResult(ok_without_home, str(error), _method_text(rtl_autopilot_title(setup)))]
     results = {answer.ok for answer in answers}
     ok = False if False in results else None if None in results else True
     # Failures come first, then unknown answers.
@@ -186,7 +188,7 @@ _NOT_KNOWN = "it is not fully known whether the aircraft gets home as the scenar
 
 
 def _method_text(autopilot: str) -> str:
-    """Describe how returns are judged.
+    """Describe how simulated returns to launch are judged.
 
     autopilot: title of the autopilot that returns.
     """
@@ -207,21 +209,20 @@ class _RequirementResult(NamedTuple):
 
 
 def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _RequirementResult:
-    """Judge whether every RTL is safe.
+    """Answer the requirement that the RTL from every start is safe.
 
-    starts: positions and times from which the aircraft returns.
     interval: time between the starts, s.
     """
     judged_returns = judge_returns(world, starts, interval)
     return _RequirementResult(
         None if judged_returns.undecided else judged_returns.safe,
-        headline(judged_returns),
+        returns_headline(judged_returns),
         _method_text(judged_returns.autopilot),
     )
 
 
 def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _RequirementResult:
-    """Judge whether a glide from every start reaches home, a rally point, a landing site or flat ground.
+    """Answer the requirement that a glide from every start reaches home, a rally point, a landing site or flat ground.
 
     Starts below the minimum height above ground are omitted.  The aircraft is taking off or landing there, and would
     descend straight ahead.
@@ -232,7 +233,9 @@ def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Requir
         f"; {is_low.sum()} starts lower than {world.limit:.0f} m above ground are omitted" if is_low.any() else ""
     )
     reason = f"without the engine: {glides_headline(glides)}{omitted_text}"
-    return _RequirementResult(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
+    return _RequirementResult(
+        glides.always_reaches_ground, reason, f"glides that keep {GLIDE_CLEARANCE_M:.0f} m above ground"
+    )
 
 
 # The go-around has its own rule.
@@ -243,10 +246,11 @@ _JUDGES: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Requir
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
-    """Return the finding on a flown RTL as a list; [] for a mission without an RTL.
+    """Return one finding on the mission's RTL in a flight, or [] for a mission without an RTL.
 
     The finding passes if the aircraft arrived; otherwise it is not judged.
-    reason: text on how the flight ended, which is appended if the aircraft did not arrive.
+
+    reason: text on the end of the flight, which is appended if the aircraft did not arrive.
     """
     outcome = "flown to its end" if has_arrived else f"the flight did not reach its end{reason}"
     return _rtl_findings(requirements, True if has_arrived else None, outcome)
@@ -273,7 +277,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     return [
         make_finding(
             "return",
-            requirements.waypoint(route.rtl_start + 1),
+            requirements.waypoint_place(route.rtl_start + 1),
             ok=ok,
             reason=reason,
             faults=faults,
@@ -297,10 +301,12 @@ def without_path_following_findings(
         return tuple(findings)
     # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
     end_waypoint = requirements.setup.route.rtl_end
-    return_points = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
+    return_points = {
+        requirements.waypoint_place(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))
+    }
     legs = requirements.setup.route.rtl_legs
-    return_points |= {requirements.leg(i) for i in legs}
-    first_corner = requirements.waypoint(first_leg)
+    return_points |= {requirements.leg_place(i) for i in legs}
+    first_corner = requirements.waypoint_place(first_leg)
     kept_findings = [
         finding
         for finding in findings
@@ -314,7 +320,7 @@ def without_path_following_findings(
     ):
         return tuple(kept_findings)
     # Each part of the flown return belongs to a drawn leg.  A drawn leg without such a part was not flown.
-    unflown_places = {requirements.leg(i) for i in legs if not aligned.has_flown(i)}
+    unflown_places = {requirements.leg_place(i) for i in legs if not aligned.has_flown(i)}
     return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown_places)
 
 
@@ -322,7 +328,7 @@ def _suggest_end_loiter(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest an unlimited loiter at the last waypoint, if the automatic return from there fails."""
-    setup, end = requirements.setup, requirements.waypoint(requirements.legs)
+    setup, end = requirements.setup, requirements.waypoint_place(requirements.legs)
     commands = {item.seq: item.command for item in setup.mission.items}
     is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT
     if finding.place != end or not is_waypoint or not judges_return_after_last_item(setup):

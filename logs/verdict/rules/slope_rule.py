@@ -20,7 +20,7 @@ from logs.verdict.findings import (
     make_finding,
     message,
 )
-from logs.verdict.measures.acceptance import slope_with_next_leg, step_height
+from logs.verdict.measures.acceptance import negligible_step_height, slope_with_next_leg
 from logs.verdict.measures.ground_following import follows_ground, mean_ground_slope, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
 from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
@@ -50,7 +50,10 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of each leg, except in turnarounds; if ``geometric``, judge only the route."""
+    """Judge the slope of each leg of the route and of the flight, except in the turnarounds of surveys.
+
+    If ``geometric``, judge only the route.
+    """
     findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
         if leg in turnaround_legs:
@@ -68,11 +71,11 @@ def slope_findings(
 
 
 def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: float, *, is_flown: bool) -> Finding:
-    """Judge a vertical leg whose change of altitude is flown on the next leg.
+    """Judge a vertical leg that the autopilot flies together with the next leg.
 
-    Without a flight a climb is not judged, because the aircraft is then below the next leg as drawn.
+    A climb is undecided without a flight, because the aircraft flies below the next leg as drawn.
 
-    slope: slope of the vertical leg and the next leg together, rad, positive for a climb.
+    slope: slope of the vertical leg and the next leg flown as one, rad, positive for a climb.
     """
     sign = math.copysign(1.0, slope)
     limit, source = slope_limit(requirements, leg + 1, is_climb=sign > 0.0)
@@ -81,7 +84,7 @@ def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: floa
     check = UNKNOWN_AIRCRAFT if is_uncertain and float(certain_limits[leg + 1]) < limit < math.inf else ""
     climb = float(requirements.points[leg + 1, 2] - requirements.points[leg, 2])
     reason = (
-        f"{place_text(requirements.waypoint(leg + 1))} is passed at once; the {abs(climb):.0f} m"
+        f"{place_text(requirements.waypoint_place(leg + 1))} is passed at once; the {abs(climb):.0f} m"
         f" {'up' if climb > 0.0 else 'down'} to it are flown on the next leg, which then needs"
         f" {math.degrees(slope):+.2f}°"
     )
@@ -90,7 +93,7 @@ def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: floa
         reason += ", and the aircraft flies below that leg as drawn, which only a flight can judge"
     return make_finding(
         "slope",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=None if check else True,
         reason=reason,
         planned=math.degrees(slope),
@@ -148,7 +151,9 @@ def _leg_finding(
             method = "not flown"
     # Faults of the arc come last, because the arc at a steep leg's end is steep, too.
     faults = faults + arc_faults
-    uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, measure, has_failed=bool(faults))
+    uncertainty = (
+        "" if ground else _uncertainty_text(requirements, leg, limit, source, measure, has_failed=bool(faults))
+    )
     check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
     ok = None if check else not faults
     facts = [uncertainty, *facts] if uncertainty else facts
@@ -159,7 +164,7 @@ def _leg_finding(
     deciding_fit = None if is_plan_steep else slope_fit
     return make_finding(
         "slope",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=ok,
         reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -180,10 +185,11 @@ def _leg_finding(
 def _flown_messages(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
 ) -> tuple[list[Message], list[str], list[Fact]]:
-    """Return the faults, the facts and the measurements of a flown leg.
+    """Return the faults of a flown leg, texts on what was measured, and the measurements.
 
-    With the limits of a known aircraft, only exceeded limits and a lack of performance are faults.  The flown slope and
-    the height error are then facts.
+    If the aircraft's limits are judged (`RouteRequirements.envelope`), only a lack of performance is a fault, and texts
+    report the other deviations from the plan.
+
     limit: limit of the slope, rad.
     """
     performance_faults = _performance_faults(requirements, leg, measure, limit)
@@ -211,7 +217,7 @@ def _flown_messages(
         measured.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
     arc = steep_arc(requirements, leg)
     if arc is not None and _is_arc_within_tolerance(arc, measure):
-        place = place_text(requirements.waypoint(leg + 1))
+        place = place_text(requirements.waypoint_place(leg + 1))
         named_facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     facts = [text for name, text in named_facts if name not in flown_faults]
     if requirements.envelope:
@@ -222,20 +228,19 @@ def _flown_messages(
 def _planned_slope_messages(
     requirements: RouteRequirements, leg: int, limit: float, source: str
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults and the facts of a leg's planned slope.
+    """Return the faults of a leg's planned slope, and texts that explain a steep slope that is no fault.
+
+    A leg that is too steep is no fault in two cases.  The first is a negligible step in height.  The second is a leg
+    over ground that falls more steeply than the aircraft can descend: the aircraft is then only too high.
 
     limit: limit of the slope, rad.
     source: source of the limit: "scenario" or "aircraft".
-
-    A leg that is too steep has no fault, but a fact, in two cases.  The first is a negligible step in height.  The
-    second is a leg over ground that falls more steeply than the aircraft can descend: the aircraft is then only too
-    high.
     """
     faults: list[Message] = []
     facts: list[str] = []
     slope = float(requirements.slopes[leg])
     if abs(slope) > limit + PLAN_TOLERANCE_RAD:
-        step = step_height(requirements, leg)
+        step = negligible_step_height(requirements, leg)
         ground_slope = mean_ground_slope(requirements, leg) if slope < 0.0 and source != "scenario" else math.nan
         if ground_slope < -limit:
             facts.append(
@@ -249,7 +254,7 @@ def _planned_slope_messages(
             if requirements.runs[leg] < MIN_LEG_LENGTH_M:
                 height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
                 slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(slope)):.1f}°"
-            number, verb = requirements.leg(leg).number, "climbs" if slope >= 0.0 else "descends"
+            number, verb = requirements.leg_place(leg).number, "climbs" if slope >= 0.0 else "descends"
             if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
                 airspeed = float(requirements.route.leg_airspeeds[leg])
                 explanation = f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s"
@@ -265,10 +270,10 @@ def _planned_slope_messages(
 class _SteepGround(NamedTuple):
     """Ground that a leg follows and that is steeper than the aircraft or its autopilot can fly.
 
-    slope: as in `GroundSlope`.
-    limit: rad, positive.
+    slope: mean slope of the steep part of the ground, rad.
+    limit: limit of the climb slope, rad, positive.
     source: source of the limit: "scenario", "aircraft" or "autopilot".
-    fault: states the slope and its limit, and how low the aircraft would get.
+    fault: message on the slope, its limit, and how low the aircraft would get.
     """
 
     slope: float
@@ -278,11 +283,11 @@ class _SteepGround(NamedTuple):
 
 
 def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
-    """Return the ground that rises too steeply for a leg to follow it; None without one.
+    """Return the part of the ground that rises too steeply for the aircraft to follow it on a leg, or None.
 
-    Ground is also ignored if the height that the aircraft misses is negligible.  After a flight, the measured height
-    error decides, and the autopilot's climb rate limits the slope, too.  Falling ground is no fault, because the
-    aircraft is then only higher than the leg demands.
+    Return None also for a leg that does not follow the ground, and if the aircraft gets at most `NEGLIGIBLE_STEP_M` too
+    low.  After a flight, the measured height error decides, and the autopilot's climb rate limits the slope, too.
+    Falling ground is no fault, because the aircraft is then only higher than the leg demands.
     """
     if not follows_ground(requirements, leg):
         return None
@@ -301,7 +306,7 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
         else _limit_text(requirements, leg, limit, source)
     )
     brief = (
-        f"leg {requirements.leg(leg).number} follows ground that rises at {math.degrees(ground.slope):.1f}°"
+        f"leg {requirements.leg_place(leg).number} follows ground that rises at {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
     explanation = f"; {limit_text}, so the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
@@ -309,11 +314,13 @@ def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasu
 
 
 def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
-    """Return the standard deviation of the slope limit of an aircraft with an uncertain model, rad.
+    """Return the standard deviation of an uncertain slope limit, rad.
 
-    The deviation, like the limit, is a slope over the ground.  If the aircraft can certainly fly no slope at all, it is
-    the deviation in still air.
-    certain_limit: limit reduced by the uncertainty, rad.
+    The deviation, like the limit, is a slope over the ground.  If there is no slope that the aircraft can certainly
+    fly, it is the deviation in still air.
+
+    limit: limit by the aircraft's model, rad.
+    certain_limit: limit reduced by the uncertainty of the model, rad.
     """
     envelope = requirements.setup.envelope
     if certain_limit <= 0.0:
@@ -321,7 +328,7 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
     return (limit - certain_limit) / UNDECIDED_FRACTION
 
 
-def _ability_text(
+def _uncertainty_text(
     requirements: RouteRequirements,
     leg: int,
     limit: float,
@@ -330,17 +337,18 @@ def _ability_text(
     *,
     has_failed: bool,
 ) -> str:
-    """Explain what an uncertain aircraft model does: it leaves a slope undecided or limits suggestions.
+    """Explain how the uncertainty of the aircraft's model affects a leg: it leaves the slope undecided.
 
-    Return "" for an aircraft without uncertainty, and for a decided slope.  Return "" also for a planned slope above
-    the limit, because its own message states the limit.
+    For a leg that has failed, the text states the slope that is certainly possible, for suggestions.  Return "" if the
+    uncertainty does not matter, and for a planned slope above the limit, whose own message states the limit.
+
     limit, source: limit of the slope, rad, and its source.
     has_failed: True if the leg fails.
     """
     planned_slope, setup = float(requirements.slopes[leg]), requirements.setup
     if has_failed:
         return "" if abs(planned_slope) > limit else _certain_limit_text(requirements, leg, limit, source)
-    # Only the limits of the aircraft count here, not a lower limit of the scenario.
+    # Only the limits of the aircraft are compared here, not a lower limit of the scenario.
     limits, certain_limits, verb = (
         (requirements.climb, requirements.certain_climb, "climbs")
         if planned_slope >= 0.0
@@ -367,10 +375,11 @@ def _ability_text(
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State the slope that an aircraft with an uncertain model can certainly fly, for suggestions.
+    """State the slope that an aircraft with an uncertain model can certainly fly.
 
-    Suggested slopes stay within it.  Return "" if the whole limit is certain, or if the limit does not come from the
+    Suggested slopes do not exceed it.  Return "" if the whole limit is certain, or if the limit does not come from the
     aircraft.
+
     limit, source: limit of the slope, rad, and its source.
     """
     envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
@@ -390,12 +399,12 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     if arc is None or (measure is not None and _is_arc_within_tolerance(arc, measure)):
         return []
     corner = leg + 1
-    place = requirements.waypoint(corner)
+    place = requirements.waypoint_place(corner)
     length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
     slope = math.degrees(math.atan(abs(arc.tangent)))
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
-    first, second = requirements.leg(leg).number, requirements.leg(corner).number
+    first, second = requirements.leg_place(leg).number, requirements.leg_place(corner).number
     arc_text = f"the arc at {place_text(place)} {verb} at {slope:.1f}° for {length:.0f} m"
     side = "below" if arc.tangent > 0.0 else "above"
     limit = (
@@ -409,7 +418,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
 
 
 def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
-    """Return True if the height that a flown arc misses is within a leg's height tolerance.
+    """Return True if a leg was flown to its end and its end's arc misses at most `HEIGHT_ERROR_LIMIT_M` of height.
 
     Other rules judge the airspeed and the height above ground on the arc.
     """
@@ -417,7 +426,7 @@ def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
 
 
 def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
-    """State ground speed and wind if the headwind stops the aircraft in a climb or descent; otherwise "".
+    """State ground speed and wind if the headwind leaves no ground speed in a climb or descent; otherwise "".
 
     The aircraft makes no progress if, at the steepest climb or descent, the horizontal part of its airspeed is not
     larger than the headwind.
@@ -481,7 +490,11 @@ def _throttle_text(requirements: RouteRequirements, name: str) -> str:
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Return, for full and idle throttle: name, duration (s), speed error (m/s) and "slow" or "fast"."""
+    """Return a tuple each for full and idle throttle.
+
+    It contains the name ("full" or "idle"), the duration, s, the airspeed error, m/s, and its direction ("slow" or
+    "fast").
+    """
     return (
         ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
         ("idle", measure.idle_throttle_time, measure.speed_gain, "fast"),
@@ -491,10 +504,10 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> dict[str, Message]:
-    """Return the faults of a flown leg by quantity: "slope", "height", and "full" or "idle" throttle.
+    """Return the faults of a flown leg by what is wrong: "slope", "height", or speed at "full" or "idle" throttle.
 
     limit: limit of the slope, rad.
-    performance_faults: faults that show a lack of performance.
+    performance_faults: faults that show a lack of performance; an airspeed error is then always a fault.
     """
     faults = {}
     planned_slope = float(requirements.slopes[leg])
@@ -530,12 +543,15 @@ def _flown_faults(
 
 
 def _throttle_limit(planned_slope: float) -> str:
-    """Name the throttle limit that a slope (rad) may reach: "full" for a climb, "idle" for a descent."""
+    """Return the throttle limit that a slope (rad) may require: "full" for a climb, "idle" for a descent."""
     return "full" if planned_slope >= 0.0 else "idle"
 
 
 def _missing_ability(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> float:
-    """Return the slope by which the aircraft climbed or sank too little at the throttle limit, rad; 0 if it did not."""
+    """Return by how much the slope shown at the throttle limit falls short of the leg's slope, rad; 0 if it does not.
+
+    The tolerance and the error of the measured ability are subtracted.  A nearly level leg has no shortfall.
+    """
     ability, planned_slope = measure.ability, abs(float(requirements.slopes[leg]))
     if ability is None or planned_slope <= LEVEL_SLOPE_RAD:
         return 0.0
@@ -543,7 +559,10 @@ def _missing_ability(requirements: RouteRequirements, leg: int, measure: SlopeMe
 
 
 def _climb_shortfall(requirements: RouteRequirements, leg: int) -> float:
-    """Return the slope by which the model climbs less at the throttle limit than was stated, rad; 0 for a descent."""
+    """Return by how much the model's climb slope at a limited throttle falls short of the stated one, rad.
+
+    Return 0 for a descent, and for an autopilot that does not limit the throttle.
+    """
     setup = requirements.setup
     is_limited = bool(setup.autopilot.speeds.max_throttle_name) and float(requirements.slopes[leg]) > 0.0
     return setup.envelope.climb_shortfall if is_limited else 0.0
@@ -552,9 +571,10 @@ def _climb_shortfall(requirements: RouteRequirements, leg: int) -> float:
 def _performance_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
 ) -> list[Message]:
-    """Return a fault for each limit of climb or descent that kept the aircraft from flying a leg.
+    """Return a fault for each limit on climb or descent that kept the aircraft from flying a leg.
 
-    The limits are a climb or sink rate of the autopilot, and what the aircraft could fly at the throttle limit.
+    The limits are the autopilot's climb or sink rate, and the slope that the aircraft showed at the throttle limit.
+
     limit: limit of the slope, rad.
     """
     texts = []

@@ -70,7 +70,10 @@ def speed_findings(
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the flown airspeed and the airspeed that the mission commands on a leg (`demanded`, m/s)."""
+    """Judge the airspeed that is commanded on a leg, and the flown airspeed.
+
+    demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
+    """
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = _command_notes(requirements, leg, demanded, min_speed, max_speed)
@@ -118,7 +121,7 @@ def _speed_finding(
     ok = None if check else not faults
     return make_finding(
         "speed",
-        requirements.leg(leg),
+        requirements.leg_place(leg),
         ok=None if ok and is_unflown else ok,
         reason=finding_reason(faults, notes),
         faults=faults,
@@ -152,12 +155,12 @@ class _HeldSpeed(NamedTuple):
 def _find_held_speed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float
 ) -> _HeldSpeed | None:
-    """Return the airspeed held on a leg if it is far from the command, otherwise None.
+    """Return the airspeed held on a leg if it differs too much from the command, otherwise None.
 
     The airspeed is the mean over the second half of the leg's steady rows, because the aircraft may still change its
-    speed in the first half.  Return None also for a leg that is too steep, because the slope rule reports it.  Return
-    None for an imported flight, because its airspeed sensor may have the same error, and for an airspeed that was
-    raised to keep a minimum ground speed.
+    speed in the first half.  Return None also for a leg that was flown steadily for too short a time, for a leg that is
+    too steep, because the slope rule reports it, for an imported flight, whose airspeed sensor may be wrong, and for an
+    airspeed that was raised to keep a minimum ground speed or that vertical wind caused.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -246,7 +249,7 @@ def _command_notes(
 
 
 def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return moving one-second means of the airspeed, m/s; one mean for less than a second."""
+    """Return the moving one-second means of the airspeed, m/s, (n,); a single mean for less than a second."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     sums = np.concatenate([[0.0], np.cumsum(speed)])
@@ -268,9 +271,11 @@ def _is_caused_by_vertical_wind(requirements: RouteRequirements, aligned: Aligne
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the airspeed range of level flight on a whole leg, m/s, and faults of the commanded airspeed.
+    """Return the minimum and maximum airspeed of level flight on a whole leg, m/s, and faults of the command.
 
-    The airspeeds are NaN if level flight is impossible at one end of the leg.
+    Both airspeeds are NaN if level flight is impossible at one end of the leg.
+
+    commanded: commanded true airspeed, m/s.
     """
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(altitude) for altitude in altitudes]
@@ -279,7 +284,7 @@ def _level_speed_range(
     max_speed = float(np.min([upper for _, upper in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
-        number = requirements.leg(leg).number
+        number = requirements.leg_place(leg).number
         faults.append(message(f"the wind is too strong to hold the course of leg {number} at {commanded:.0f} m/s"))
     max_altitude = max(altitudes)
     if math.isnan(min_speed) or math.isnan(max_speed):
@@ -302,10 +307,10 @@ def _level_speed_range(
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance and its minimum one-second mean, m/s.
+    """Return a leg's mean airspeed, the tolerance of this mean, and the minimum one-second mean, all in m/s.
 
-    Return None if the leg was flown steadily for too short a time.
-    The tolerance allows for gusts and for a change of slope at the start of the leg.
+    The tolerance allows for gusts and for a change of slope at the start of the leg.  Return None if the leg was flown
+    steadily for too short a time.
     """
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]

@@ -28,7 +28,7 @@ from world.wind import W20
 
 @dataclass(frozen=True, slots=True)
 class _Margin:
-    """Airspeed in a turn, compared with the stall speed in the same bank.
+    """Airspeed in a bank, with the stall speed in the same bank.
 
     speed: true airspeed, m/s.
     stall_speed: stall speed in this bank, true airspeed, m/s.
@@ -50,10 +50,11 @@ class _Margin:
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum margin of airspeed above the stall in a bank; [] without a turn.
+    """Judge the smallest margin of the airspeed above the stall speed in a bank, in planned turns or in flight.
 
-    A route whose airspeed is below the stall speed in a planned turn also fails after a flight.  An autopilot that flew
-    faster or banked less does not make the route flyable.
+    A route whose airspeed is below the stall speed in a planned turn also fails after a flight: an autopilot that flew
+    faster or banked less does not make the route flyable.  Return [] for a plan without a turn, and for a flight that
+    cannot be compared.
     """
     # The planned turn with the smallest margin above the stall.
     worst_margin: tuple[float, int, _Margin] | None = None
@@ -71,7 +72,9 @@ def stall_findings(
     planned = []
     if worst_margin is not None:
         _, corner, margin = worst_margin
-        planned = [_stall_finding(margin, f"at waypoint {requirements.waypoint(corner).number}", 0.0, geometric=True)]
+        planned = [
+            _stall_finding(margin, f"at waypoint {requirements.waypoint_place(corner).number}", 0.0, geometric=True)
+        ]
     if geometric:
         return planned
     # Without an envelope there is no limit to compare a flight with.
@@ -102,10 +105,10 @@ def stall_findings(
 
 
 def planned_bank(requirements: RouteRequirements, waypoint: int, speed: float) -> float:
-    """Return the bank that the turn at a waypoint needs at an airspeed (m/s), up to the bank limit, rad.
+    """Return the bank that the turn at a waypoint needs at an airspeed (m/s), at most the bank limit, rad.
 
-    On an arc of radius R, the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A short turn ends
-    before the aircraft has rolled in completely.  It needs only the bank reached by then.
+    On an arc of radius R, the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  In a turn so short
+    that the aircraft cannot roll in completely, it is only the bank that can be reached.
     """
     turn = abs(float(requirements.turns[waypoint]))
     radius = float(requirements.radius[waypoint])
@@ -138,6 +141,7 @@ def _window_means(values: NDArray[np.floating], width: int) -> Floats:
 def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *, geometric: bool) -> Finding:
     """Make the finding on a margin above the stall.
 
+    time_or_place_text: text on the time or place of the margin, such as "at waypoint 3".
     tolerance: accepted deficit of airspeed, m/s.
     """
     stall_text = (

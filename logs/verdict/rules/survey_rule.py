@@ -58,10 +58,10 @@ _MIN_STATED_GAP_M = 0.5
 def survey_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each photo line and the overlap of each survey's photos.
+    """Judge each photo line, and the overlap of each survey's photos.
 
-    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it,
-    and report turnarounds that cannot be flown as drawn.
+    If ``geometric``, the usable part of a line is the part that its turns and the climb or descent before it leave
+    straight and at its altitude.  Turnarounds near hazards that cannot be flown as drawn are then reported, too.
     """
     findings = []
     for survey in requirements.surveys:
@@ -80,8 +80,8 @@ def survey_findings(
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
     """Judge the smallest front and side overlap of a survey's photos against the required overlaps.
 
-    An overlap that is not measured or not required has no finding.  The side overlap is not judged if it is large
-    enough, but the crab angle reduces the common area of the photos below the limit.  Return [] if the survey's camera
+    An overlap that is not measured or not required has no finding.  The side overlap is undecided if it is large
+    enough, but the crab angles reduce the common area of the photos below the limit.  Return [] if the survey's camera
     is unknown.
     """
     measure = measure_overlap(requirements, aligned, survey)
@@ -122,7 +122,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe a survey's minimum overlap of photos, the lines with it, and the required overlap.
+    """Describe the minimum overlap of a survey's photos, on which lines it occurs, and the required overlap.
 
     Return "" if the overlap is unknown.
 
@@ -150,7 +150,7 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def crab_text(measure: OverlapMeasure) -> str:
-    """Describe the crab angle of a survey's photos, and the common area of photos side by side."""
+    """Describe the largest crab angle of a survey's photos, and the area that neighbouring photos have in common."""
     judged_text = (
         "the side overlap is therefore not judged" if measure.is_side_unknown else "the overlap does not include this"
     )
@@ -161,7 +161,7 @@ def crab_text(measure: OverlapMeasure) -> str:
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report turnarounds near hazards that are too tight or too steep to be flown as drawn.
+    """Return an undecided finding for each turnaround near hazards that is too tight or too steep to fly as drawn.
 
     The path of such a turnaround is known only after a flight.  The turns onto the first line and off the last line
     are also turnarounds.
@@ -186,7 +186,7 @@ def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Surv
                 f"flown as drawn; within {reach:.0f} m of it {'; '.join(hazards)}; only a simulated "
                 "flight shows whether the turn is safe"
             )
-            place, method = requirements.leg(first), "its surroundings"
+            place, method = requirements.leg_place(first), "its surroundings"
             findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_PATH, method=method))
     return findings
 
@@ -198,12 +198,13 @@ def _is_too_tight(requirements: RouteRequirements, corner: int) -> bool:
 
 
 def _off_altitude_length(requirements: RouteRequirements, first: int, last: int, end: int, tolerance: float) -> float:
-    """Return the length of route after a turnaround that is flown off the planned altitude, m.
+    """Return the length of route after a turnaround on which the aircraft is not yet at the planned altitude, m.
 
     The aircraft starts the turnaround at the planned altitude, and then climbs or descends no steeper than its limits.
+
     first, last: waypoints at which the turnaround begins and ends.
     end: waypoint up to which the length is measured.
-    tolerance: altitude error at which the aircraft is back at the planned altitude, m.
+    tolerance: altitude error within which the aircraft is at the planned altitude, m.
     """
     altitude, length = float(requirements.points[first, 2]), 0.0
     for leg in range(first, end):
@@ -234,13 +235,13 @@ def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine,
 
 def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
     """Return the first leg of a photo line as the place of its findings."""
-    return requirements.leg(line.first)
+    return requirements.leg_place(line.first)
 
 
 def _planned_finding(
     requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int, before: int
 ) -> Finding:
-    """Judge the fraction of a planned photo line that is flown straight and at its altitude.
+    """Judge the fraction of a planned photo line that is flown straight, at its altitude and with the camera on.
 
     number: number of the line in its survey, from 1.
     before: waypoint at which the turnaround before the line begins.
@@ -267,7 +268,7 @@ def _planned_finding(
         )
         turn_lead = mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
     turn_out = _clip_to_length(turn_lead - lead_out, length)
-    # The autopilot switches the camera off where it counts the waypoint as reached.
+    # The autopilot switches the camera off where it considers the waypoint reached.
     camera_out, off = 0.0, line.camera_off_at
     if off >= 0:
         beyond_end = float(requirements.runs[line.last : off].sum()) - float(requirements.runs[off : line.last].sum())
@@ -303,6 +304,7 @@ def _planned_finding(
 def _unknown_ground_message(requirements: RouteRequirements, fraction: float, length: float, name: str) -> Message:
     """Make a message on the fraction of a photo line that lies outside the terrain data.
 
+    fraction: fraction of the line's length.
     length: length of the line, m.
     name: name of the line.
     """
@@ -312,7 +314,7 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
 
 
 def _clip_to_length(distance: float, length: float) -> float:
-    """Limit a distance to the range 0 to `length`, m; return `length` for a non-finite distance."""
+    """Clip a distance to the range from 0 to `length`, m; a non-finite distance becomes `length`."""
     return min(max(distance, 0.0), length) if math.isfinite(distance) else length
 
 
@@ -352,8 +354,8 @@ def _flown_finding(
             f": {unusable_parts_text(measure)}{ends_text}",
         )
         faults, facts = [fault], []
-    if measure.missed_photos:
-        facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
+    if measure.missed_photo_count:
+        facts.append(f"{measure.missed_photo_count} of {count_text(measure.planned_photo_count, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
 
 
@@ -370,9 +372,9 @@ def usable_text(fraction: float) -> str:
 
 
 def unusable_parts_text(measure: LineMeasure) -> str:
-    """List the causes that make parts of a photo line unusable, with their fractions, the largest first.
+    """List the causes that make parts of a photo line unusable, with the fraction of each, the largest first.
 
-    Fractions below 0.5 % are left out.  Return "" if all are.
+    Causes with less than 0.5 % of the line are left out.  Return "" if no cause remains.
     """
     fractions = {
         f"not flown along the line within {measure.lateral_tolerance:.0f} m": measure.off_line,
@@ -411,7 +413,7 @@ def _line_finding(
             Fact("height error", measure.max_height_error, "m"),
             Fact("lost at its start", measure.lost_at_start, "m"),
             Fact("lost at its end", measure.lost_at_end, "m"),
-            Fact("photos missed", float(measure.missed_photos), ""),
+            Fact("photos missed", float(measure.missed_photo_count), ""),
         ]
     return make_finding(
         "survey",

@@ -1,10 +1,10 @@
-"""The take-off and landing rules: judge the climb to a mission's first place, and its final approach.
+"""The take-off and landing rules: judge the slopes of the climb to the take-off waypoint and of the final approach.
 
-A flight begins and ends in the air, so both are judged from only the mission's places, whether or not the mission was
-flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than the
-aircraft can climb is not judged, because QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and
-autopilots continue to climb.  Any part of a mission's own take-off or landing that is not judged leaves the verdict
-undecided, and so does a slope that is close to the limit of an uncertain model of the aircraft.
+A simulated flight usually begins and ends in the air, so both are judged from the mission's items, whether or not the
+mission was flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper
+than the aircraft can climb is undecided, because QGroundControl draws a climb-out of 30 degrees (its
+TakeoffMissionItem), and autopilots continue to climb.  Any part of a mission's own take-off or landing that is not
+judged leaves the verdict undecided, and so does a slope that is close to the limit of an uncertain aircraft model.
 """
 
 import math
@@ -20,7 +20,7 @@ from logs.verdict.suggestions import suggest_gentler_landing
 from logs.verdict.tolerances import LEVEL_SLOPE_RAD, PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 
-# Verb, by rule, that says which end of a flight is in the air if the phase is not flown.
+# Verb, by rule, for the text that a flight begins or ends in the air if the phase is not flown.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
 _PHASE_TITLES = {"takeoff": "take-off", "landing": "landing"}
 # Check, by rule, of a slope that is undecided because the aircraft's model is uncertain.
@@ -32,9 +32,11 @@ _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the climb from home to the take-off item's waypoint; [] without a take-off item.
+    """Judge the slope of the climb from home to the take-off item's waypoint.
 
-    Return [] also if the take-off was flown, because the launch rule then judges it.
+    With a launch in the scenario, the climb to the next waypoint is judged if the item has no position of its own, and
+    a launch too gentle to start the motor fails.  Return [] without a take-off item on the ground, and for a flown
+    take-off, which the launch rule judges.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.take_off is not None:
         return []
@@ -55,7 +57,7 @@ def takeoff_findings(
         return [
             make_finding(
                 "takeoff",
-                requirements.waypoint(0),
+                requirements.waypoint_place(0),
                 ok=False,
                 reason=fault.text,
                 faults=[fault],
@@ -74,12 +76,12 @@ def takeoff_findings(
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_position:
         reason = f"the autopilot chooses the course of the climb to {altitude:.0f} m AMSL over home"
-        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
+        return [_unjudged_finding("takeoff", requirements.waypoint_place(waypoint), reason)]
     imported_log = requirements.setup.imported_log
     if imported_log is not None and not imported_log.aircraft_known:
         return [
             _unjudged_finding(
-                "takeoff", requirements.waypoint(waypoint), "no aircraft was named; name it with --aircraft"
+                "takeoff", requirements.waypoint_place(waypoint), "no aircraft was named; name it with --aircraft"
             )
         ]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
@@ -89,10 +91,10 @@ def takeoff_findings(
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope from the last waypoint to the landing; return [] without a landing item.
+    """Judge the slope from the last waypoint before the landing to the landing point.
 
-    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] also for a flown landing,
-    which the touchdown rule judges.
+    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] without a landing item, and
+    for a flown landing, which the touchdown rule judges.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
@@ -105,7 +107,7 @@ def landing_findings(
         route = requirements.setup.route
         if route.rtl_start is not None:
             reason = RTL_NOT_CONTINUED_TEXT
-        end_waypoint = requirements.waypoint(requirements.legs)
+        end_waypoint = requirements.waypoint_place(requirements.legs)
         is_return_continued = RTL_NOT_CONTINUED_TEXT in " ".join(route.notes)
         if route.rtl_start is not None and not is_return_continued:
             # The return ends the mission; the landing after it is not flown.
@@ -144,7 +146,7 @@ def _slope_finding(
     first, last: waypoints.  If the first belongs to a loiter, the slope begins where the path leaves the circle.
     first_altitude, last_altitude: altitudes at these waypoints, m AMSL; None if the terrain there is unknown.
     """
-    waypoint_place = requirements.waypoint(last)
+    waypoint_place = requirements.waypoint_place(last)
     distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())
     if first_altitude is None or last_altitude is None:
         return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")

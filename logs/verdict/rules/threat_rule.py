@@ -27,8 +27,9 @@ def threat_findings(
 ) -> list[Finding]:
     """Judge each missile or radar sphere that the planned path or the flight touches.
 
-    If the judged path enters no missile sphere, the first finding states this and the distance from the nearest one,
-    even if the planned path of a flight enters a sphere.  Without a scenario, one unjudged finding is returned.
+    If the judged path enters no missile sphere, the first finding states this and the distance from the nearest one.
+    The judged path is the flown track, or the planned path if ``geometric``.  Without a scenario, return one unjudged
+    finding.
     """
     scenario = requirements.setup.scenario
     if scenario.external:
@@ -94,7 +95,7 @@ class _Visit:
 
 
 def _sphere_visit(visits: SphereVisits | None, threat: int) -> _Visit:
-    """Return the visit to one threat's sphere; its values are all NaN if the path has no visits."""
+    """Return the visit to the sphere of one threat, by its index; all values are NaN if `visits` is None."""
     if visits is None:
         return _Visit()
     columns = (visits.time_inside, visits.exposure, visits.closest, visits.closest_time)
@@ -155,9 +156,9 @@ def _sphere_finding(
     flown_visit: _Visit | None,
     radius: float,
 ) -> Finding:
-    """Make the finding on a sphere.  An entered missile sphere fails; a radar sphere always passes.
+    """Make the finding on a sphere: an entered missile sphere fails, and a radar sphere always passes.
 
-    flown_visit: visit of the flown track; None before a flight, and the planned visit is then judged.
+    flown_visit: visit of the flown track; None to judge the planned visit.
     radius: radius of the sphere, m.
     """
     judged_visit = planned_visit if flown_visit is None else flown_visit
@@ -179,7 +180,7 @@ def _sphere_finding(
             time = aligned.track.time
             k = max(0, min(len(time) - 2, int(np.searchsorted(time, flown_visit.closest_time, side="right")) - 1))
             fraction = float((flown_visit.closest_time - time[k]) / (time[k + 1] - time[k]))
-            leg = requirements.leg(aligned.leg_at(k))
+            leg = requirements.leg_place(aligned.leg_at(k))
             facts += f" on {place_text(leg)} {aligned.position_text(k, fraction)}"
     flown_time = None if flown_visit is None else flown_visit.time_inside
     if place.kind == "radar":

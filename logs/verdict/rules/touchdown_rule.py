@@ -15,7 +15,7 @@ import numpy as np
 from flight.mission.ground_phases import Approach
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.ground_paths import first_hazard_on_path, track_path
+from logs.verdict.measures.ground_paths import hazard_on_path, track_path
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -66,19 +66,22 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing; before a flight, only report a strip too short to be judged."""
+    """Judge a flown landing with one finding; before a flight, only report a strip that is too short to be judged.
+
+    Return [] without a flown landing, unless ``geometric`` and the planned strip is too short.
+    """
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
         planned_approach = requirements.setup.ground_phases.approach if geometric else None
         faults = [] if planned_approach is None else _short_strip_messages(planned_approach)
         if planned_approach is None or not faults:
             return []
-        place = requirements.waypoint(planned_approach.leg + 1)
+        place = requirements.waypoint_place(planned_approach.leg + 1)
         reason = finding_reason(faults)
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=faults, check=GROUND_PATH)]
     approach = ground_phases.procedures.approach
-    place = ground_phases.whole_route.waypoint(approach.leg + 1)
-    track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
+    place = ground_phases.whole_route.waypoint_place(approach.leg + 1)
+    track, terrain = ground_phases.landing_track, requirements.setup.scenario.terrain
     if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
         reason = "the flight did not reach its landing"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
@@ -109,7 +112,7 @@ def touchdown_findings(
         point_height=point_height
     )
     faults = _detect_faults(approach, landing)
-    if entered_hazard := first_hazard_on_path(requirements, track_path(track)):
+    if entered_hazard := hazard_on_path(requirements, track_path(track)):
         faults.append(message(f"the final approach enters {entered_hazard}"))
     has_gusts = requirements.setup.scenario.wind.turbulence != "none"
     return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]
@@ -120,8 +123,9 @@ def _measure_landing(
 ) -> _Landing:
     """Measure a landing: touchdown, stop, sink rates, and lowest clearance of the final approach.
 
+    The result's `point_height` remains NaN.
+
     touchdown_row: row of the track in which the aircraft touches down.
-    The result's `point_height` is not set and remains NaN.
     """
     position = np.asarray(track.position, dtype=np.float64)
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
@@ -162,7 +166,8 @@ def _landing_finding(
 ) -> Finding:
     """Make the finding on a measured landing.
 
-    The finding fails if there are `faults`.  It is undecided if the simulation is too inaccurate to decide it.
+    It fails if there are `faults`; without faults, it is undecided if the simulation is too inaccurate to pass it.
+
     has_gusts: True if the air is turbulent.
     """
     # Parts of the landing that the simulation is too inaccurate to decide.
@@ -227,7 +232,7 @@ def _landing_finding(
 
 
 def _landing_point_text(approach: Approach) -> str:
-    """Return the mission item of the landing point as text."""
+    """Name the mission item of the landing point."""
     return f"item {approach.item}"
 
 

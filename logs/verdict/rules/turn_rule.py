@@ -1,4 +1,4 @@
-"""The turn rule: judge whether each corner can be flown on its legs, and how it was flown."""
+"""The turn rule: judge whether the turn at each corner fits its legs, and how it was flown."""
 
 import math
 
@@ -34,9 +34,9 @@ from world.geometry import fly_by_offset
 def turn_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Return a finding for the turn at each inner waypoint, except at the waypoints of turnarounds.
+    """Judge the turn at each inner waypoint, except at the waypoints of turnarounds.
 
-    If ``geometric``, judge only the route, without a flight.
+    If ``geometric``, judge only the planned turns.
     """
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
@@ -53,9 +53,9 @@ def turn_findings(
 def _turn_finding(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
-    """Return the finding for the turn at a waypoint.
+    """Judge the turn at a waypoint; a turn next to a vertical leg is not judged.
 
-    measure: measurements of the flown turn; None before a flight.
+    measure: measurements of the flown turn; None to judge only the planned turn.
     """
     planned_turn = abs(float(requirements.turns[waypoint]))
     limit, source = turn_limit(requirements, waypoint)
@@ -63,7 +63,7 @@ def _turn_finding(
     limit = max(limit, 0.0)
     if requirements.runs[waypoint - 1 : waypoint + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
-        return make_finding("turn", requirements.waypoint(waypoint), ok=None, reason=reason, unit="deg")
+        return make_finding("turn", requirements.waypoint_place(waypoint), ok=None, reason=reason, unit="deg")
     faults, facts, check, judged_turn = _judge_planned_turn(requirements, waypoint, limit, source)
     # With a known aircraft, the planned turn is compared with its limits, and the flown turn is only described.
     is_judged_as_planned = measure is None or bool(requirements.envelope)
@@ -105,7 +105,7 @@ def _turn_finding(
         measured_facts = [Fact(quantity, value, unit) for quantity, value, unit in quantities if value is not None]
     return make_finding(
         "turn",
-        requirements.waypoint(waypoint),
+        requirements.waypoint_place(waypoint),
         ok=ok,
         reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -127,8 +127,10 @@ def _judge_planned_turn(
 ) -> tuple[list[Message], list[str], str, float | None]:
     """Judge the planned turn at a waypoint by its limit (rad).
 
-    Return faults, facts, a check (`UNKNOWN_AIRCRAFT` or ""), and the turn (rad).  The turn is None for a negligible
-    kink.
+    Return faults, texts on the turn, a check (`UNKNOWN_AIRCRAFT` or ""), and the planned turn, rad.  A negligible kink
+    is no fault, and its turn is returned as None.
+
+    source: source of the limit: "scenario" or "aircraft".
     """
     turn = abs(float(requirements.turns[waypoint]))
     turn_text = f"turns {math.degrees(turn):.1f}°"
@@ -190,14 +192,14 @@ def _unflown_turn_text(
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
     radius, _ = acceptance_limit(requirements, leg + 1)
     return (
-        f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg(leg))} for only"
+        f"{requirements.setup.autopilot.title} flew {place_text(requirements.leg_place(leg))} for only"
         f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
         f" {radius:.0f} m"
     )
 
 
 def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> list[tuple[str, str]]:
-    """Describe a flown turn, as pairs of a measured quantity's name and a text."""
+    """Describe a flown turn: pairs of the name of a measured quantity and a text on it."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(("course change", f"flown course change {math.degrees(measure.angle):.2f}°"))
@@ -220,9 +222,9 @@ def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMe
 def _flown_faults(
     requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
 ) -> dict[str, Message]:
-    """Return the faults of a flown turn by quantity: names of `_flown_facts`, or "circles".
+    """Return the faults of a flown turn by measured quantity: a name as in `_flown_facts`, or "circles".
 
-    limit: largest course change, rad.
+    limit: largest permitted course change, rad.
     """
     faults, setup = {}, requirements.setup
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:

@@ -26,7 +26,10 @@ from world.arrays import Floats
 def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the distance of the track, or of the planned path (``geometric``), from each waypoint."""
+    """Judge the distance of the track, or of the planned path if ``geometric``, from each waypoint.
+
+    The waypoints of turnarounds are left out.
+    """
     turnaround_waypoints = requirements.turnaround_waypoints()
     judged_waypoints = [
         waypoint for waypoint in range(len(requirements.points)) if waypoint not in turnaround_waypoints
@@ -38,7 +41,10 @@ def waypoint_findings(
 
 
 def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
-    """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
+    """Judge whether the fly-by arc passes within the acceptance radius of its waypoint.
+
+    A waypoint that is flown over, or whose autopilot flies no fly-by arcs, passes.
+    """
     limit, source = acceptance_limit(requirements, waypoint)
     offset = float(requirements.fly_by_offset[waypoint])
     faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
@@ -67,7 +73,7 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         )
     return make_finding(
         "waypoint",
-        requirements.waypoint(waypoint),
+        requirements.waypoint_place(waypoint),
         ok=not faults,
         reason=finding_reason(faults) if faults else fact,
         faults=faults,
@@ -86,9 +92,9 @@ def _flown_finding(
 ) -> Finding:
     """Judge the closest approach of the track to a waypoint.
 
-    A waypoint to which the flight was not yet flying when it ended is not judged.
+    If the flight ended before it was flying to the waypoint, the finding is not judged.
 
-    apexes: points of the planned path nearest to the waypoints, m, (w, 3).
+    apexes: points at which the planned path passes the waypoints, m, (w, 3).
     """
     setup, (limit, source) = requirements.setup, acceptance_limit(requirements, waypoint)
     # The limit of an autopilot that follows the path already includes a margin.
@@ -123,7 +129,7 @@ def _flown_finding(
         if math.isfinite(crossing_offset):
             reason += f"; the line across the leg at the waypoint was crossed {crossing_offset:.0f} m to the side"
         if waypoint > 0 and not aligned.passed[waypoint]:
-            last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
+            last_leg = requirements.leg_place(aligned.leg_at(len(aligned.track) - 1))
             text = f": the flight ended on {place_text(last_leg)} {math.hypot(distance, height_error):.0f} m away"
             faults = [message("not reached", text)]
             ok, reason = False, finding_reason(faults)
@@ -139,7 +145,7 @@ def _flown_finding(
             reason = f"missed: {reason}; {condition_text}{error_text}"
     return make_finding(
         "waypoint",
-        requirements.waypoint(waypoint),
+        requirements.waypoint_place(waypoint),
         ok=ok,
         reason=reason,
         faults=faults,
@@ -181,10 +187,10 @@ def _closest_approach(
     return float(distance.min()), float(heights[np.argmin(np.abs(heights))])
 
 
-def explain_by_circles(
+def with_circles_in_reasons(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Add to each failed finding's reason the circles that the autopilot flew at its waypoints."""
+    """Return the findings, and add to each failure's reason the circles that the autopilot flew at its waypoints."""
     circles = {} if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)
@@ -224,5 +230,5 @@ RULE = Rule(
         "CHORD_TIME_S",
     ),
     judge=waypoint_findings,
-    merge=explain_by_circles,
+    merge=with_circles_in_reasons,
 )

@@ -14,7 +14,7 @@ import numpy as np
 from flight.mission.route import Route
 from flight.simulation.track import THROTTLE
 from logs.recording.reader import FlightLog
-from logs.verdict.measures.path_sweeps import passages, segment_clearances
+from logs.verdict.measures.path_sweeps import segment_clearances, sphere_stays
 from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
@@ -92,7 +92,7 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     threats = setup.scenario.threats
     for k, name in enumerate(threats.names):
         for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
-            for stay in passages(track.time, track.position, threats.position[k], float(radius)):
+            for stay in sphere_stays(track.time, track.position, threats.position[k], float(radius)):
                 threat_range = f"the {unit} range of {name}"
                 entries.append(TimelineEntry(stay.start, "threat", f"inside {threat_range} ({float(radius):.0f} m)"))
                 # The track may end inside the range.

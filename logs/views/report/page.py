@@ -27,8 +27,8 @@ from logs.verdict.presentation import (
     RESULT_COLUMNS,
     count_sentence,
     finding_words,
+    limit_violation_text,
     method_text,
-    missed_text,
     number_texts,
     state_text,
 )
@@ -296,7 +296,7 @@ def _render_page(
         verdict=verdict,
         texts={
             "method": method_text,
-            "missed": missed_text,
+            "missed": limit_violation_text,
             "numbers": number_texts,
             "state": state_text,
             "words": finding_words,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track, control_limits, saturated_rows
-from logs.verdict.measures.path_sweeps import passages, segment_clearances
+from logs.verdict.measures.path_sweeps import segment_clearances, sphere_stays
 from logs.verdict.measures.track_alignment import takeoff_and_approach_rows
 from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats
@@ -324,7 +324,7 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
         (stay, name, unit, float(radii[k]))
         for k, name in enumerate(threats.names)
         for unit, radii in (("missile", threats.kill_radius), ("radar", threats.detection_radius))
-        for stay in passages(track.time, track.position, threats.position[k], float(radii[k]))
+        for stay in sphere_stays(track.time, track.position, threats.position[k], float(radii[k]))
     ]
     return [
         (

@@ -213,7 +213,7 @@ def test_a_line_misses_the_photos_for_which_its_camera_is_too_slow(spacing: floa
 
 
 def test_the_photos_on_the_lines_are_those_taken_there() -> None:
-    line: Any = SimpleNamespace(photos=101, missed_photos=1, taken_photos=100)
+    line: Any = SimpleNamespace(planned_photo_count=101, missed_photo_count=1, taken_photo_count=100)
     assert count_line_photos([line, None, line]) == 200
 
 
@@ -224,7 +224,9 @@ def test_a_flight_without_lines_does_not_deny_the_camera() -> None:
 def test_the_first_line_names_an_overlap_that_is_too_small(tmp_path: Path) -> None:
     setup = setup_with(tmp_path, survey_of(75.0))
     [survey] = judged_surveys(setup)
-    usable: Any = SimpleNamespace(ok=True, usable=1.0, photos=14, missed_photos=0, taken_photos=14)
+    usable: Any = SimpleNamespace(
+        ok=True, usable=1.0, planned_photo_count=14, missed_photo_count=0, taken_photo_count=14
+    )
     lines = tuple(itertools.repeat(usable, len(survey.lines)))
     overlap = OverlapMeasure(CAMERA, 0.348, photo_spacing=75.0)
     verdict: Any = None

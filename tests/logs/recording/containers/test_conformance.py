@@ -10,7 +10,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Schema
 
 from logs.recording import mcap_writer
-from logs.recording.mcap_reader import Container, read_chunks, record_stream, records
+from logs.recording.mcap_reader import Container, chunk_records, read_chunks, record_stream
 from logs.recording.mcap_writer import ContainerWriter
 from logs.recording.reader import read_log
 from tests.logs.recording.containers.conformance_vectors import CONTENTS, DATA, MAGIC, Content, variants, vector
@@ -69,7 +69,7 @@ def test_each_vector_is_read_whole(name: str, tmp_path: Path) -> None:
         data = vector(content, chosen)
         file, found = io.BytesIO(data), Container()
         file.seek(len(MAGIC))
-        read = [parsed(opcode, body) for part in read_chunks(file, found) for opcode, _, body in records(part)]
+        read = [parsed(opcode, body) for part in read_chunks(file, found) for opcode, _, body in chunk_records(part)]
         assert (found.problem, found.attachments) == ("", attachments), chosen
         assert read == wanted, chosen
         path = tmp_path / f"{'-'.join((name, *chosen))}.mcap"

@@ -10,7 +10,7 @@ import pytest
 
 from flight.simulation.setup import Damage, Heights, ImportedLog, RowFaults
 from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_log
-from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, row_faults_text
+from logs.verdict.imported.judge_imported_flight import altitude_source_text, damage_text, row_faults_text
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import LogOptions
@@ -251,7 +251,7 @@ def test_each_fault_of_rows_is_counted_by_name() -> None:
 
 def test_each_datum_is_named() -> None:
     said = {
-        datum: heights_text(ImportedLog("a", "", "", heights=Heights("POS", datum)))
+        datum: altitude_source_text(ImportedLog("a", "", "", heights=Heights("POS", datum)))
         for datum in ("amsl", "ellipsoid", "pressure", "unstated")
     }
     assert len(set(said.values())) == 4

@@ -9,12 +9,12 @@ import pytest
 
 from logs.verdict.measures.acceptance import (
     acceptance_limit,
-    corner_depths,
     corridor_limit,
     farthest_from_legs,
     negligible_kink_distance,
+    negligible_step_height,
     position_error,
-    step_height,
+    turn_deviations,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.synthetic import bank_radius, make_setup
@@ -43,8 +43,8 @@ def test_a_turn_leads_off_its_legs_by_its_own_arc() -> None:
     """R (1 - cos 45) inside a right angle; R beyond the next leg where the waypoint is flown over; 0 straight on."""
     by, over = make_setup(RIGHT_ANGLE), make_setup(RIGHT_ANGLE, fly_over=(1,))
     inside = bank_radius() * (1.0 - math.sqrt(0.5))
-    assert corner_depths(route_requirements(by), 0).tolist() == pytest.approx([0.0, inside], abs=1e-9)
-    assert corner_depths(route_requirements(over), 1).tolist() == pytest.approx([bank_radius(), 0.0], abs=1e-9)
+    assert turn_deviations(route_requirements(by), 0).tolist() == pytest.approx([0.0, inside], abs=1e-9)
+    assert turn_deviations(route_requirements(over), 1).tolist() == pytest.approx([bank_radius(), 0.0], abs=1e-9)
     assert [corridor_limit(route_requirements(by), leg) for leg in (0, 2)] == [
         (pytest.approx(inside + 10.0), "fly-by path"),
         (30.0, "default"),
@@ -98,7 +98,7 @@ def test_the_corners_of_a_circle_are_no_jog() -> None:
 @pytest.mark.parametrize(("rise", "height"), [(9.9, 9.9), (-9.9, 9.9), (10.1, None), (-10.1, None)])
 def test_a_step_is_as_high_as_its_leg(rise: float, height: float | None) -> None:
     requirements = demands_of([[0, 0, 300], [0, 1000, 300], [0, 1010, 300 + rise], [0, 2000, 300 + rise]])
-    assert step_height(requirements, 1) == (None if height is None else pytest.approx(height))
+    assert negligible_step_height(requirements, 1) == (None if height is None else pytest.approx(height))
 
 
 def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
@@ -106,10 +106,10 @@ def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
     for _ in range(3):
         points.append([0.0, points[-1][1] + 10.0, points[-1][2] + 3.0])
     requirements = demands_of([*points, [0.0, 3000.0, 309.0]])
-    assert [step_height(requirements, leg) for leg in (1, 2, 3)] == pytest.approx([9.0, 9.0, 9.0])
+    assert [negligible_step_height(requirements, leg) for leg in (1, 2, 3)] == pytest.approx([9.0, 9.0, 9.0])
     points.append([0.0, points[-1][1] + 10.0, points[-1][2] + 3.0])
     requirements = demands_of([*points, [0.0, 3000.0, 312.0]])
-    assert [step_height(requirements, leg) for leg in (1, 2, 3, 4)] == [None] * 4
+    assert [negligible_step_height(requirements, leg) for leg in (1, 2, 3, 4)] == [None] * 4
     assert math.degrees(requirements.slopes[1]) == pytest.approx(math.degrees(math.atan2(3, 10)))
 
 

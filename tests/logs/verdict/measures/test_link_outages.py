@@ -68,8 +68,8 @@ def test_outages_by_interpolated_margins(
 
 
 def test_the_worst_point_is_that_of_the_smallest_known_margin(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert along_margins(monkeypatch, [3.0, UNKNOWN, -7.0, 2.0]).worst == 2
-    assert along_margins(monkeypatch, [UNKNOWN, UNKNOWN]).worst == -1
+    assert along_margins(monkeypatch, [3.0, UNKNOWN, -7.0, 2.0]).worst_point == 2
+    assert along_margins(monkeypatch, [UNKNOWN, UNKNOWN]).worst_point == -1
 
 
 @pytest.mark.parametrize(("duration", "count"), [(0.0, 2), (0.3, 2), (1.0, 2), (1.2, 3), (7.5, 9)])
@@ -91,4 +91,4 @@ def test_rows_without_a_position_or_a_time_are_left_out() -> None:
     along = link_along_path(any_link(), FLAT, np.array([0.0, 0.0, 3.0]), time, path)
     assert along.positions[:, 1] == pytest.approx([0.0, 1000.0, 2000.0, 3000.0, 4000.0])
     nothing = link_along_path(any_link(), FLAT, np.array([0.0, 0.0, 3.0]), time[2:3], path[2:3])
-    assert (len(nothing.time), nothing.outages, nothing.worst) == (0, (), -1)
+    assert (len(nothing.time), nothing.outages, nothing.worst_point) == (0, (), -1)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from logs.verdict.measures.path_sweeps import passages, path_clearance, path_spheres, segment_clearances
+from logs.verdict.measures.path_sweeps import path_clearance, path_spheres, segment_clearances, sphere_stays
 from tests.synthetic import make_scenario
 from world.geometry import segment_exposure
 from world.terrain import make_flat_terrain, make_gridded_terrain
@@ -89,7 +89,7 @@ def test_a_path_has_the_heights_of_its_segments_bit_for_bit() -> None:
 def test_passage_times_are_the_spheres_chord(speed: float, offset: float, rate: float) -> None:
     time = np.arange(round(3000.0 / speed * rate) + 2) / rate
     position = np.stack([-1500.0 + speed * time, np.full(time.size, offset), np.full(time.size, 100.0)], axis=1)
-    (stay,) = passages(time, position, np.array([0.0, 0.0, 100.0]), 400.0)
+    (stay,) = sphere_stays(time, position, np.array([0.0, 0.0, 100.0]), 400.0)
     half = math.sqrt(400.0**2 - offset**2)
     assert stay.start == pytest.approx((1500.0 - half) / speed, abs=1e-6)
     assert stay.end == pytest.approx((1500.0 + half) / speed, abs=1e-6)
@@ -100,11 +100,11 @@ def test_passage_times_are_the_spheres_chord(speed: float, offset: float, rate: 
 def test_a_flight_that_starts_and_ends_inside() -> None:
     time = np.array([0.0, 1.0, 2.0, 3.0])
     position = np.array([[0.0, 0.0, 0.0], [200.0, 0.0, 0.0], [200.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    first, last = passages(time, position, np.zeros(3), 100.0)
+    first, last = sphere_stays(time, position, np.zeros(3), 100.0)
     assert (first.start, first.end, first.whole) == (0.0, 0.5, True)
     assert (last.start, last.end, last.whole) == (2.5, 3.0, False)
-    assert passages(time, position, np.array([0.0, 0.0, 500.0]), 100.0) == []
-    assert passages(time, position, np.zeros(3), 0.0) == []
+    assert sphere_stays(time, position, np.array([0.0, 0.0, 500.0]), 100.0) == []
+    assert sphere_stays(time, position, np.zeros(3), 0.0) == []
 
 
 def test_garbage_positions_meet_nothing() -> None:
@@ -116,17 +116,17 @@ def test_garbage_positions_meet_nothing() -> None:
     assert low[0] == pytest.approx(35.0)
     assert at[0] == pytest.approx(1.0)
     assert np.isnan(low[1:]).all()
-    stays = passages(np.arange(5.0), position, np.zeros(3), 60.0)
+    stays = sphere_stays(np.arange(5.0), position, np.zeros(3), 60.0)
     assert [(stay.start, stay.end) for stay in stays] == [(0.0, 1.0)]
 
 
 def test_no_sphere_and_no_way_have_no_stay() -> None:
     way = np.array([[-100.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
-    assert len(passages(np.arange(2.0), way, np.zeros(3), 50.0)) == 1
+    assert len(sphere_stays(np.arange(2.0), way, np.zeros(3), 50.0)) == 1
     for radius in (0.0, -50.0, math.nan):
-        assert passages(np.arange(2.0), way, np.zeros(3), radius) == []
+        assert sphere_stays(np.arange(2.0), way, np.zeros(3), radius) == []
     for rows in (0, 1):
-        assert passages(np.arange(2.0)[:rows], np.zeros((rows, 3)), np.zeros(3), 50.0) == []
+        assert sphere_stays(np.arange(2.0)[:rows], np.zeros((rows, 3)), np.zeros(3), 50.0) == []
     ground = make_flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
     for rows in (0, 1):
         assert [one.size for one in segment_clearances(ground, np.zeros((rows, 3)))] == [0, 0]

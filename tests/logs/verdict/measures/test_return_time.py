@@ -9,7 +9,7 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.return_time import longest_return_time, remaining_time
+from logs.verdict.measures.return_time import longest_return_time, remaining_battery_time
 from logs.verdict.measures.route_requirements import predicted_energy, route_requirements
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
@@ -63,13 +63,13 @@ def test_the_remaining_time_is_by_the_higher_of_the_initial_and_the_level_curren
     assert failsafe is not None
     # 10 of 20 Ah at 100 A.
     energy = 10.0 * setup.envelope.volts
-    assert remaining_time(requirements, failsafe, energy, 1.0) == pytest.approx(360.0)
+    assert remaining_battery_time(requirements, failsafe, energy, 1.0) == pytest.approx(360.0)
     level = 2.0 * setup.envelope.power(float(requirements.route.leg_airspeeds[0]), 400.0, 0.0) / setup.envelope.volts
     low = failsafe._replace(initial_current=0.0)
-    assert remaining_time(requirements, low, energy, 2.0) == pytest.approx(36_000.0 / level, rel=1e-6)
+    assert remaining_battery_time(requirements, low, energy, 2.0) == pytest.approx(36_000.0 / level, rel=1e-6)
     limits = replace(setup.limits, envelope=replace(setup.envelope, volts=0.0))
     fuel = replace(setup, limits=limits)
-    assert math.isnan(remaining_time(route_requirements(fuel), failsafe, energy, 1.0))
+    assert math.isnan(remaining_battery_time(route_requirements(fuel), failsafe, energy, 1.0))
 
 
 @pytest.mark.parametrize(("share", "ok"), [(1.01, True), (0.99, None)])

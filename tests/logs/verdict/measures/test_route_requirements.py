@@ -222,7 +222,7 @@ def test_waypoints_are_places_with_their_items(setup: FlightSetup) -> None:
     items = setup.route.items.copy()
     items[1] = -1
     requirements = route_requirements(replace(setup, route=setup.route.with_fields(item=items)))
-    assert [requirements.waypoint(k) for k in (1, 2)] == [Place("waypoint", 1), Place("waypoint", 2, item=2)]
+    assert [requirements.waypoint_place(k) for k in (1, 2)] == [Place("waypoint", 1), Place("waypoint", 2, item=2)]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -266,8 +266,11 @@ def test_a_leg_names_the_item_that_it_leads_to_and_none_of_ours() -> None:
     # As after a jump back to item 4, and along a lead-out that no item asks for.
     items = np.array([4, 4, -1])
     requirements = route_requirements(replace(setup, route=setup.route.with_fields(item=items)))
-    assert [(requirements.leg(k).index, requirements.leg(k).to_item) for k in range(2)] == [(0, 4), (1, None)]
-    assert [requirements.waypoint(k).item for k in range(3)] == [4, 4, None]
+    assert [(requirements.leg_place(k).index, requirements.leg_place(k).to_item) for k in range(2)] == [
+        (0, 4),
+        (1, None),
+    ]
+    assert [requirements.waypoint_place(k).item for k in range(3)] == [4, 4, None]
 
 
 def test_limits_of_a_mission_without_a_scenario_are_not_the_scenarios() -> None:

@@ -101,7 +101,7 @@ def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
     low = [one.own_return for one in judged(hill_setup(tmp_path), 1.0).each if one.own_return.end == "low"]
     assert low
     assert all(0.0 < one.clearance < 30.0 for one in low)
-    assert found.arrivals == sum(one.own_return.end == "arrives" for one in found.each) > len(before)
+    assert found.arrival_count == sum(one.own_return.end == "arrives" for one in found.each) > len(before)
     # It is never better than the best there is, but for what the turn gives back of its speed.
     assert all(one.home_altitude_left > -25.0 for one in found.each if one.own_return.end == "arrives")
 

@@ -20,14 +20,14 @@ from logs.verdict.returns.judge_returns import (
     Returns,
     ReturnWorld,
     SimulatedReturn,
+    engine_out_world,
     judge_returns,
     limit_ratio,
     make_return_world,
-    without_engine_world,
     worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, _ground_phase_starts, planned_starts
-from logs.verdict.returns.returns_text import headline, range_text
+from logs.verdict.returns.returns_text import return_range_text, returns_headline
 from planfly.api.returning import ReturnsResult
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from tests.soak import some
@@ -66,7 +66,7 @@ def test_ranges_are_in_order_and_hold_every_return(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     words = {"ground": "unsafe", "low": "too low", "safe": "safe"}
     for one in found.ranges:
-        assert f" s: {words[one.worst.kind]}; the " in range_text(one, found, setup.scenario)
+        assert f" s: {words[one.worst.kind]}; the " in return_range_text(one, found, setup.scenario)
         inside = [each for each in found.each if one.first <= each.time <= one.last]
         assert len(inside) == one.count
         assert {each.kind for each in inside} == {one.worst.kind}
@@ -74,7 +74,7 @@ def test_ranges_are_in_order_and_hold_every_return(tmp_path: Path) -> None:
 
 def test_rtl_altitude_over_the_hill_is_safe(tmp_path: Path) -> None:
     assert all(one.safe for one in judged(hill_setup(tmp_path), RTL_ALTITUDE=600.0).each)
-    assert headline(judged(hill_setup(tmp_path), RTL_ALTITUDE=600.0)).startswith("all ")
+    assert returns_headline(judged(hill_setup(tmp_path), RTL_ALTITUDE=600.0)).startswith("all ")
 
 
 def test_a_sphere_and_a_zone_beside_the_way_are_met_and_named(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_a_sphere_and_a_zone_beside_the_way_are_met_and_named(tmp_path: Path) ->
     assert first_of(found, "threat") >= 1200.0
     worst = next(one for one in found.ranges if one.worst.kind == "threat")
     assert worst.worst.sphere_distance == pytest.approx(-70.0, abs=15.0)
-    assert "m into the sphere of post" in range_text(worst, found, hill_setup(tmp_path, threat).scenario)
+    assert "m into the sphere of post" in return_range_text(worst, found, hill_setup(tmp_path, threat).scenario)
     zone = (
         '[[zones]]\nname = "town"\nkind = "exclusion"\nradius_m = 300\neast_m = 1200\nnorth_m = 0\n'
         "ceiling_amsl_m = 300\n"
@@ -137,7 +137,7 @@ def test_a_return_after_the_battery_is_empty_fails_also_where_nothing_was_flown(
     assert last.energy_used == pytest.approx(needed, rel=0.02)
     late = [one for one in found.each if one.energy_used > 0.4 * needed]
     assert {one.kind for one in late} == {"energy"}
-    assert "ends with an empty battery" in range_text(found.ranges[0], found, setup.scenario)
+    assert "ends with an empty battery" in return_range_text(found.ranges[0], found, setup.scenario)
 
 
 def test_a_return_after_an_unknown_use_of_energy_is_undecided(tmp_path: Path) -> None:
@@ -145,12 +145,12 @@ def test_a_return_after_an_unknown_use_of_energy_is_undecided(tmp_path: Path) ->
     world, starts = make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
     known = judge_returns(world, starts, 20.0)
     assert known.safe
-    assert "Wh are left" in headline(known)
+    assert "Wh are left" in returns_headline(known)
     starts.energy_used[:] = math.nan
     found = judge_returns(world, starts, 20.0)
     assert {one.kind for one in found.each} == {"used"}
     assert (found.safe, found.undecided, found.point_of_no_return.kind) == (False, True, "used")
-    assert headline(found) == (
+    assert returns_headline(found) == (
         f"all {len(starts)} returns cannot be judged by energy, because the energy used before them is unknown"
     )
     # With a guessed battery energy is not judged at all.
@@ -230,7 +230,7 @@ def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
     assert len(stub.asked) == 4
     assert {one.kind for one in far.each if one.time in {asked.time for asked in stub.asked}} == {"ground"}
     assert far.count("unsure") > 5
-    assert "JSBSim disagree" in headline(far)
+    assert "JSBSim disagree" in returns_headline(far)
     # How far it is from a sphere that is far away decides nothing.
     assert not judge_returns(world, starts, OFTEN, Stub(before, 0.0, 2000.0)).count("unsure")
     # What could not be flown stays as it was.
@@ -292,7 +292,7 @@ def test_one_that_begins_low_in_a_take_off_is_held_to_what_it_has(tmp_path: Path
     assert len(low) > 2
     assert all(one.required_height == pytest.approx(one.start[2] - 2.0, abs=0.2) for one in low)
     assert {one.kind for one in found.each} == {"safe"}
-    assert "taking off" in range_text(found.ranges[0], found, setup.scenario)
+    assert "taking off" in return_range_text(found.ranges[0], found, setup.scenario)
     # Down to 15 m over home it is lower than those that begin higher, and than the least height where they begin above.
     sinks = judged(setup, 2.0, RTL_ALTITUDE=15.0)
     assert {one.kind for one in sinks.each if one.start[2] > 20.0} == {"low"}
@@ -308,16 +308,16 @@ def test_a_flight_that_is_too_low_without_a_take_off_excuses_no_return(tmp_path:
     # The required height is 30 m, with a tolerance of 1 m.
     count = sum(one.start[2] < 29.0 for one in found.each)
     assert 1 < count < len(found.each)
-    assert f" safe; at {count} starts the flight itself is below the required height" in headline(found)
+    assert f" safe; at {count} starts the flight itself is below the required height" in returns_headline(found)
     safe = replace(found, each=tuple(one for one in found.each if one.safe))
-    assert "the flight itself" not in headline(safe)
+    assert "the flight itself" not in returns_headline(safe)
     (low,) = [one for one in found.ranges if one.worst.starts_too_low]
-    text = range_text(low, found, setup.scenario)
+    text = return_range_text(low, found, setup.scenario)
     assert ": too low; " in text
     assert (
         text.partition("Wh")[0].count("(the flight itself is below the required height where this return begins)") == 1
     )
-    assert not any("taking off" in range_text(one, found, setup.scenario) for one in found.ranges)
+    assert not any("taking off" in return_range_text(one, found, setup.scenario) for one in found.ranges)
 
 
 def test_a_climb_out_ends_where_the_required_height_is_reached_or_its_leg_ends(tmp_path: Path) -> None:
@@ -444,8 +444,8 @@ def test_glides_and_returns_with_px4_have_the_airspeeds_of_its_file(tmp_path: Pa
     world = make_return_world(replace(setup, autopilot=own))
     assert (world.autopilot, world.min_airspeed, world.min_airspeed_name) == (own, 19.5, "FW_AIRSPD_MIN")
     # ArduPlane stands in without an engine.
-    of_file = without_engine_world(world).autopilot.parameters
-    of_aircraft = without_engine_world(make_return_world(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
+    of_file = engine_out_world(world).autopilot.parameters
+    of_aircraft = engine_out_world(make_return_world(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
     assert isinstance(of_file, ArduPilotParameters)
     assert [of_file[name] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")] == [19.5, 24.0, 30.0]
     assert of_aircraft.min_airspeed == 18.0
@@ -472,7 +472,7 @@ def test_returns_on_either_side_of_the_limit_have_different_heights(tmp_path: Pa
     texts = []
     for clearance, kind in ((29.93, "safe"), (29.87, "low")):
         worst = replace(found.ranges[0].worst, clearance=clearance, required_height=30.0, kind=kind)
-        texts.append(range_text(replace(found.ranges[0], worst=worst), found, setup.scenario))
+        texts.append(return_range_text(replace(found.ranges[0], worst=worst), found, setup.scenario))
         assert f"{clearance} m above ground (required: 30 m, with a tolerance of 0.1 m)" in texts[-1]
     assert "safe; " in texts[0]
     assert "too low; " in texts[1]

@@ -10,7 +10,7 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.returns.drawn_returns import min_safe_altitudes
 from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world, required_heights
 from logs.verdict.returns.return_starts import planned_starts
-from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
+from logs.verdict.returns.returns_text import describe_return_causes, describe_rtl_ending, returns_headline
 from logs.verdict.returns.suggest_returns import meets_return_limits, suggest_parameters, suggest_rally_points
 from planfly.workflow.open_flight import open_flight
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -50,9 +50,9 @@ def test_it_flies_straight_to_the_landing_sequence_over_what_is_between(tmp_path
     assert reaches(found, "ground") == pytest.approx(6000.0 - 5130.0, abs=150.0)
     assert reaches(found, "low") == pytest.approx(6000.0 - 4664.0, abs=150.0)
     assert all(one.safe for one in found.each if one.start[0] > 1500.0)
-    assert describe_landing(found)[0] == "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4"
+    assert describe_rtl_ending(found)[0] == "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4"
     assert not found.safe
-    assert headline(found).endswith("are safe; the landing is not judged")
+    assert returns_headline(found).endswith("are safe; the landing is not judged")
 
 
 @pytest.mark.parametrize(("amsl", "kind"), [(20.0, "safe"), (-30.0, "ground")])
@@ -151,28 +151,28 @@ def test_it_goes_on_from_its_circle_to_the_landing_sequence(tmp_path: Path) -> N
     assert {one.kind for one in high.each} == {"safe"}
     assert min(one.clearance for one in high.each) == pytest.approx(100.0, abs=25.0)
     assert high.safe
-    assert headline(high).startswith(f"all {len(high.each)} returns are safe up to their landing: ")
-    assert headline(high).endswith("; the landing is not judged")
+    assert returns_headline(high).startswith(f"all {len(high.each)} returns are safe up to their landing: ")
+    assert returns_headline(high).endswith("; the landing is not judged")
 
 
 @pytest.mark.parametrize("value", [1, 2, 4])
 def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path, value: int) -> None:
     alone, found = judged(tmp_path, WAY), judged(tmp_path, WAY, RTL_AUTOLAND=value)
     assert [(one.kind, one.target) for one in found.each] == [(one.kind, one.target) for one in alone.each]
-    assert describe_landing(found)[0].startswith(f"RTL_AUTOLAND {value}: ")
+    assert describe_rtl_ending(found)[0].startswith(f"RTL_AUTOLAND {value}: ")
     assert not found.unjudged_parts
 
 
 def test_a_mission_with_a_landing_sequence_is_judged_with_a_setting_that_arms(tmp_path: Path) -> None:
     """ArduPlane's default, 0, does not arm with DO_LAND_START."""
     assumed = "RTL_AUTOLAND 1 (assumed: with 0 ArduPlane does not arm): from its loiter"
-    assert describe_landing(judged(tmp_path))[0].startswith(assumed)
+    assert describe_rtl_ending(judged(tmp_path))[0].startswith(assumed)
     # A value that is stated is not assumed.
-    assert describe_landing(judged(tmp_path, RTL_AUTOLAND=1))[0].startswith("RTL_AUTOLAND 1: from its loiter")
+    assert describe_rtl_ending(judged(tmp_path, RTL_AUTOLAND=1))[0].startswith("RTL_AUTOLAND 1: from its loiter")
 
 
 def test_what_each_value_says(tmp_path: Path) -> None:
-    said = [describe_landing(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
+    said = [describe_rtl_ending(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
     assert "ArduPlane does not arm" in said[0]
     assert said[1].endswith("from its loiter a return continues to the landing sequence at item 4")
     assert "for go-arounds only" in said[3]
@@ -199,7 +199,7 @@ def test_a_landing_itself_is_not_judged(tmp_path: Path) -> None:
     mission = WAY + row(3, 189) + row(4, 21, 6000.0, 1.0)
     found = judged(tmp_path, mission, RTL_AUTOLAND=2)
     assert (found.each, found.unjudged_parts) == ((), ("landing",))
-    assert headline(found) == "not judged: the landing sequence begins with the landing itself"
+    assert returns_headline(found) == "not judged: the landing sequence begins with the landing itself"
     assert found.undecided
     # The way to the circle is.
     to_circle = judged(tmp_path, mission, RTL_AUTOLAND=1, RTL_ALTITUDE=600)
@@ -214,13 +214,15 @@ def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
     kinds = {name: {one.kind for one in both.each if one.target.name == name} for name in names}
     assert kinds["home"] == {"safe"}
     assert "ground" in kinds["the landing sequence at item 4"]
-    lines = describe_causes(both.causes)
+    lines = describe_return_causes(both.causes)
     assert "landing after battery low (BATT_FS_LOW_ACT 2): the aircraft lands by its landing sequence" in lines
     assert "the mission's end: the aircraft has landed" in lines[-1]
     # Nothing triggers it, and it is not flown.
     unset = judged(tmp_path, RTL_AUTOLAND=0, BATT_FS_LOW_ACT=2, BATT_MONITOR=0)
     assert {one.target.name for one in unset.each} == {"home"}
-    assert "battery low (BATT_FS_LOW_ACT 2): set, but no threshold triggers it" in describe_causes(unset.causes)[-1]
+    assert (
+        "battery low (BATT_FS_LOW_ACT 2): set, but no threshold triggers it" in describe_return_causes(unset.causes)[-1]
+    )
 
 
 def test_mode_autoland_is_not_judged(tmp_path: Path) -> None:
@@ -240,7 +242,7 @@ def test_returns_with_settings_that_are_not_simulated_are_never_called_safe(
     found = judged(tmp_path, WAY, RTL_ALTITUDE=600, **{name: value})
     assert {one.kind for one in found.each} == {"safe"}
     assert (found.safe, found.undecided) == (False, True)
-    assert headline(found).startswith(f"not judged in full ({name} {value}")
+    assert returns_headline(found).startswith(f"not judged in full ({name} {value}")
     assert judged(tmp_path, WAY, RTL_ALTITUDE=600).safe
 
 
@@ -261,7 +263,7 @@ def test_returns_to_a_home_far_above_the_ground_are_not_judged_in_full(tmp_path:
     found = judged(tmp_path, mission, RTL_ALTITUDE=600)
     assert {one.kind for one in found.each} == {"safe"}
     assert (found.safe, found.undecided) == (ok, not ok)
-    assert headline(found).startswith("not judged in full (home is 50 m above the ground there; ") is not ok
+    assert returns_headline(found).startswith("not judged in full (home is 50 m above the ground there; ") is not ok
 
 
 def test_what_is_not_judged_is_neither_kept_nor_failed_where_it_is_required(tmp_path: Path) -> None:

@@ -23,7 +23,12 @@ from logs.verdict.returns.judge_returns import (
     make_return_world,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
-from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline, point_of_no_return_text
+from logs.verdict.returns.returns_text import (
+    describe_return_causes,
+    describe_rtl_ending,
+    point_of_no_return_text,
+    returns_headline,
+)
 from logs.verdict.returns.suggest_returns import suggest_parameters, suggest_rally_points
 from planfly.rtl.jsbsim_returns import fly_return
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -178,7 +183,7 @@ def test_the_default_returns_to_the_landing_of_the_mission(tmp_path: Path) -> No
         assert not found.unjudged_parts
     # It is left at the loiter's 60 m.
     assert min(one.clearance for one in behind) == pytest.approx(50.0, abs=12.0)
-    assert "the landing is not judged" in headline(found)
+    assert "the landing is not judged" in returns_headline(found)
     at_home = judged(tmp_path, "RTL_RETURN_ALT 450\nRTL_TYPE 0", LANDING)
     assert {one.target.name for one in at_home.each} == {"home"}
 
@@ -197,7 +202,9 @@ def test_a_return_to_a_landing_stays_below_rtl_return_alt_by_nav_fw_alt_rad(tmp_
         # Behind the hill, which is 400 m high; the circles are left at other places, which moves the paths over it.
         heights = [min(one.clearance for one in found.each if one.start[0] > 4500.0) for found in (near, far)]
         assert heights[0] - heights[1] == pytest.approx(lower_m, abs=8.0)
-    assert "Before a landing sequence, the climb may end up to NAV_FW_ALT_RAD (40 m) below" in describe_landing(far)[-1]
+    assert (
+        "Before a landing sequence, the climb may end up to NAV_FW_ALT_RAD (40 m) below" in describe_rtl_ending(far)[-1]
+    )
 
 
 @pytest.mark.parametrize(
@@ -226,12 +233,12 @@ def test_what_is_not_simulated_is_named_and_not_judged(
     assert ("because no return was simulated" in point_of_no_return_text(found)) is not is_simulated
     assert not found.safe
     assert found.undecided or mission.count("\t21\t")
-    assert said in headline(found)
+    assert said in returns_headline(found)
 
 
 def test_its_own_words_are_px4s(tmp_path: Path) -> None:
     found = judged(tmp_path, "RTL_RETURN_ALT 450\nNAV_DLL_ACT 2")
-    lines = [*describe_causes(found.causes), *describe_landing(found)]
+    lines = [*describe_return_causes(found.causes), *describe_rtl_ending(found)]
     assert "station lost (NAV_DLL_ACT 2)" in lines[0]
     assert "RTL_RETURN_ALT (450 m above the destination)" in lines[-1]
     assert (found.autoland, found.stands_in) == (None, False)

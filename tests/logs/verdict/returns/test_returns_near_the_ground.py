@@ -10,7 +10,7 @@ from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Kind, SimulatedReturn, judge_returns, make_return_world, sinks_to_ground
 from logs.verdict.returns.return_starts import SINK_HEIGHT_LOSS_M, flown_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import returns_headline
 from logs.views.report.tables import flight_sentence
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
 from world.scenario import scenario_from_spec
@@ -56,8 +56,9 @@ def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> Non
     assert starts.grounded_count >= 5
     assert found.omitted_count >= starts.grounded_count
     assert len(found.each) + found.omitted_count == pytest.approx(track.time[-1] - track.time[0], abs=2.0)
-    assert f"; {found.omitted_count} starts on or near the ground during take-off and landing omitted" in headline(
-        found
+    assert (
+        f"; {found.omitted_count} starts on or near the ground during take-off and landing omitted"
+        in returns_headline(found)
     )
     # Low are the climb to the take-off's height and the final, none between them.
     low = starts.time[starts.is_low]

@@ -20,7 +20,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.suggest_returns import (
-    MARGIN,
+    RETURN_LIMIT_MARGIN_M,
     Remedy,
     _RallySearch,
     _ReturnLimits,
@@ -48,9 +48,9 @@ def test_the_least_altitude_clears_the_hill_with_its_margin(tmp_path: Path) -> N
     assert shares == sorted(shares)
     assert len(shares) > len(good.each)
     assert all(one.safe for one in good.each)
-    assert min(one.clearance for one in good.each) >= world.limit + MARGIN
+    assert min(one.clearance for one in good.each) >= world.limit + RETURN_LIMIT_MARGIN_M
     lower = world.with_parameters(RTL_ALTITUDE=found.parameters["RTL_ALTITUDE"] - 50.0)
-    assert min(one.clearance for one in judge_returns(lower, starts, 8.0).each) < world.limit + MARGIN
+    assert min(one.clearance for one in judge_returns(lower, starts, 8.0).each) < world.limit + RETURN_LIMIT_MARGIN_M
 
 
 def test_an_altitude_that_is_safe_without_the_margin_is_suggested_if_none_keeps_it(
@@ -59,7 +59,7 @@ def test_an_altitude_that_is_safe_without_the_margin_is_suggested_if_none_keeps_
     world, starts = asked(tmp_path)
     limits = suggest_returns._return_limits
 
-    def out_of_reach(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
+    def out_of_reach(world: ReturnWorld, starts: ReturnStarts, margin: float = RETURN_LIMIT_MARGIN_M) -> _ReturnLimits:
         found = limits(world, starts, margin)
         return found if margin == 0.0 else replace(found, clearance=found.clearance + 1e4)
 

@@ -22,7 +22,7 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import flown_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.rules.link_rule import JudgedLink, duration_text, judge_link
 from tests.logs.verdict.judging import judge, of
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
@@ -284,7 +284,7 @@ def test_the_returns_begin_once_the_loss_is_noticed_and_are_judged_as_all_return
     every = {ret.time: ret for ret in judge_returns(world, starts, 1.0).each}
     # Compared as texts, in which what is not known equals itself.
     assert [repr(every[time]) for time in times] == [repr(ret) for ret in judged.returns.each]
-    assert judged.finding.reason.endswith(headline(judged.returns))
+    assert judged.finding.reason.endswith(returns_headline(judged.returns))
 
 
 def item_at(seq: int, command: Command, north: float = 0.0) -> MissionItem:

@@ -134,9 +134,9 @@ def test_the_worst_of_a_circles_legs_is_told(
 def test_a_loiters_corners_are_one_finding(outcomes: tuple[bool | None, bool | None], ok: bool | None) -> None:
     setup = loiter()
     requirements, aligned, circle = laid(setup)
-    corners = [requirements.waypoint(circle.first), requirements.waypoint(circle.last)]
+    corners = [requirements.waypoint_place(circle.first), requirements.waypoint_place(circle.last)]
     at = [finding("turn", corners[0], outcomes[0], 1.0), finding("waypoint", corners[1], outcomes[1], 1.0)]
-    outside = finding("waypoint", requirements.waypoint(circle.last + 1), True, 1.0)
+    outside = finding("waypoint", requirements.waypoint_place(circle.last + 1), True, 1.0)
     (one, rest) = merge_loiter_findings(requirements, aligned, [at[0], outside, at[1]])
     assert rest is outside
     assert (one.rule, one.place, one.ok) == ("loiter", corners[0], ok)
@@ -155,7 +155,7 @@ def test_half_a_lap_less_than_drawn_is_whole(missing: float, ok: bool | None) ->
     position = aligned.track.position.copy()
     position[is_out, :2] = circle.center + 1.4 * offsets[is_out]
     flown = replace(aligned, track=replace(aligned.track, position=position))
-    corner = requirements.waypoint(circle.first)
+    corner = requirements.waypoint_place(circle.first)
     (one,) = merge_loiter_findings(requirements, flown, [finding("turn", corner, None, 1.0)])
     assert one.ok is ok
     assert f"{circle.laps - missing:.1f}" in one.reason.split(" laps flown at ")[0].split("; ")[-1]
@@ -164,7 +164,7 @@ def test_half_a_lap_less_than_drawn_is_whole(missing: float, ok: bool | None) ->
 
 def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None:
     requirements, aligned, circle = laid(loiter())
-    corners = [requirements.waypoint(k) for k in (circle.first, circle.first + 1, circle.last)]
+    corners = [requirements.waypoint_place(k) for k in (circle.first, circle.first + 1, circle.last)]
     at = [finding("turn", corners[0], False, -1.0), finding("turn", corners[1], False, -3.0)]
     at += [finding("waypoint", corners[1], False, -2.0), finding("turn", corners[2], True, 5.0)]
     (one,) = merge_loiter_findings(requirements, aligned, at)
@@ -178,7 +178,7 @@ def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None
 
 def test_a_circle_that_was_left_early_has_no_radius() -> None:
     requirements, aligned, circle = laid(loiter(), stop=3000.0)
-    corner = requirements.waypoint(circle.first)
+    corner = requirements.waypoint_place(circle.first)
     (one,) = merge_loiter_findings(requirements, aligned, [finding("turn", corner, None, None)])
     assert one.flown is None
     assert "flown at" not in one.reason
@@ -192,7 +192,7 @@ def test_a_circle_where_the_wind_leaves_no_way_around_says_so() -> None:
     )
     (circle,) = loiter_circles(requirements)
     (one,) = merge_loiter_findings(
-        requirements, None, [finding("turn", requirements.waypoint(circle.first), True, 1.0)]
+        requirements, None, [finding("turn", requirements.waypoint_place(circle.first), True, 1.0)]
     )
     assert one.ok is False
     assert "at 25 m/s the circle cannot be flown" in one.reason
@@ -204,7 +204,7 @@ def test_a_flight_that_ends_in_a_loiter_says_nothing_against_the_loiter() -> Non
     corner = int(np.argmin(aligned.passed))
     assert circle.first < corner < circle.last
     found = [
-        make_finding("waypoint", requirements.waypoint(k), ok=k < corner, reason="")
+        make_finding("waypoint", requirements.waypoint_place(k), ok=k < corner, reason="")
         for k in range(circle.first, corner + 1)
     ]
     (item,) = merge_loiter_findings(requirements, aligned, found)

@@ -92,12 +92,13 @@ def test_nothing_holds_the_way_back_to_its_drawing_but_ground_and_energy_do() ->
 def test_a_drawn_leg_that_holds_nothing_of_the_way_says_nothing_once_the_way_was_flown() -> None:
     requirements = route_requirements(by_arduplane(setup_of(*WAY, home=HOME)))
     unflown = [
-        make_finding("clearance", requirements.leg(leg), ok=None, reason="the leg was not flown") for leg in (0, 3, 4)
+        make_finding("clearance", requirements.leg_place(leg), ok=None, reason="the leg was not flown")
+        for leg in (0, 3, 4)
     ]
     # Beside its target it may have ended in the ground.
     aligned: Any = SimpleNamespace(passed=np.array([True, True]), has_flown=lambda leg: leg == 4)
     for arrived, left in ((True, [0, 4]), (None, [0, 3, 4]), (False, [0, 3, 4])):
-        end = make_finding("return", requirements.waypoint(2), ok=arrived, reason="")
+        end = make_finding("return", requirements.waypoint_place(2), ok=arrived, reason="")
         kept = without_path_following_findings(requirements, aligned, [*unflown, end])
         assert [item.place.index for item in kept if item.rule == "clearance"] == left
 

@@ -489,7 +489,7 @@ def test_a_gate_that_is_passed_at_an_angle_costs_no_photo() -> None:
     assert aligned is not None
     (found,) = requirements.surveys
     measures = [measure_line(requirements, aligned, found, line) for line in found.lines]
-    assert [measure and measure.taken_photos for measure in measures] == [21] * 3
+    assert [measure and measure.taken_photo_count for measure in measures] == [21] * 3
     assert count_flight_photos(requirements, aligned) == 63
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from logs.verdict.measures import acceptance
-from logs.verdict.measures.acceptance import negligible_kink_distance, step_height
+from logs.verdict.measures.acceptance import negligible_kink_distance, negligible_step_height
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules import turn_rule
 from tests.synthetic import make_setup
@@ -44,7 +44,7 @@ def test_a_jog_is_within_a_quarter_of_the_corridor(share: float, found: bool) ->
 @pytest.mark.parametrize(("rise", "found"), [(9.9, True), (-9.9, True), (10.1, False), (-10.1, False)])
 def test_a_step_is_ten_metres_high(rise: float, found: bool) -> None:
     setup = make_setup([[0, 0, 300], [0, 1500, 300], [0, 1512, 300 + rise], [0, 3000, 300 + rise]])
-    height = step_height(route_requirements(setup), 1)
+    height = negligible_step_height(route_requirements(setup), 1)
     assert (height is not None) is found
     if found:
         assert height == pytest.approx(abs(rise))

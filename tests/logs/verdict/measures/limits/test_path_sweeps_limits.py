@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from logs.verdict.measures.path_sweeps import passages, path_spheres
+from logs.verdict.measures.path_sweeps import path_spheres, sphere_stays
 
 
 @pytest.mark.parametrize("away", [400.0, 8000.0])
@@ -33,4 +33,4 @@ def test_stays_a_microsecond_apart_are_one(gap: float, stays: int) -> None:
     beyond = 100.0 * gap / 2.0
     time = np.array([0.0, 1.0 + gap / 2.0, 2.0 + gap])
     position = np.array([[0.0, 0.0, 0.0], [100.0 + beyond, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    assert len(passages(time, position, np.zeros(3), 100.0)) == stays
+    assert len(sphere_stays(time, position, np.zeros(3), 100.0)) == stays
