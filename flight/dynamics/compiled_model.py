@@ -241,7 +241,7 @@ class CompiledModel:
         initialise_attitude(self.frames, self._fdm.attitudes())
 
     def differing_properties(self) -> list[str]:
-        """Return the properties that currently differ in any bit."""
+        """Return the names of the properties and contact fields that now differ from JSBSim's in any bit."""
         numbers = self.numbers.tolist()
         differing = [
             name for name, (register, getter) in self._getters.items() if not _is_equal(numbers[register], getter())

@@ -199,7 +199,7 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
 
 
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file after it has read the file; an unchanged file is read only once.
+    """Return a reader that has read a file; an unchanged file is read only once.
 
     main: True for the model itself, False for a file that it includes.
     remove_channels: True to note input and output channels for removal instead of refusing them.
@@ -211,7 +211,7 @@ def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
 
 @lru_cache(maxsize=16)
 def _read_stamped_model(file: Path, _stamp: tuple[int, ...] | None, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file after it has read the file; the stamp is a part of the cache's key."""
+    """Return a reader that has read a file; the stamp is only a part of the cache's key."""
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader

@@ -357,7 +357,7 @@ class _Translator:
                     lag = math.nan if lag_element is None else _element_number(lag_element)
                     rate = math.inf if rate_element is None else _element_number(rate_element)
                     lower, upper = _clip_limits(component) or (-math.inf, math.inf)
-                    # The factors depend on the time step, and the memory on the start of the flight.
+                    # The factors depend on the time step, and the state on the start of the flight.
                     first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
                     self.actuators.append(ActuatorBlock(first_register, inputs[0], lag, rate))
                     output = self._property_register(_component_property(component))

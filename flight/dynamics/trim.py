@@ -120,7 +120,7 @@ def settle_step(steps: Sequence[float], previous_change: Sequence[float], change
     return min(max(time_constant, step / _MAX_STEP_CHANGE, min_step), step * _MAX_STEP_CHANGE, max_step)
 
 
-# Elements of a trim vector (8,), in this order, SI and radians.  Climb is the flight-path angle to the air mass, and
+# Elements of a trim vector (8,), in this order, SI and radians. Climb is the flight-path angle to the air mass, and
 # bank a rotation about the velocity; sideslip is zero.
 TrimQuantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
 # The same names as a tuple.
@@ -312,7 +312,7 @@ def steady_flight(
 def full_throttle_climb(
     simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None
 ) -> Trim | None:
-    """Return the steady climb at full throttle, or None without one.
+    """Return the steady climb at full throttle, or None if no trim is found.
 
     simulator: JSBSim instance with the aircraft.
     airspeed: m/s.
