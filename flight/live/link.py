@@ -309,7 +309,7 @@ class Peer:
 
     @property
     def station(self) -> Station:
-        """Station that sent the message, for the mission protocol."""
+        """Station of the mission protocol that sends from this address."""
         return Station(self.address, self.system, self.component)
 
 
@@ -499,7 +499,11 @@ class Link:
         return messages
 
     def _notice_once(self, host: str, named_hosts: set[str], text: str) -> None:
-        """Add a notice about an address, unless the address is in ``named_hosts``, which receives it."""
+        """Add a notice about an address, only once for each address.
+
+        named_hosts: addresses with a notice, to which the address is added. No notice is added if there are already
+            `_MAX_NAMED_STRANGERS` of them.
+        """
         if host not in named_hosts and len(named_hosts) < _MAX_NAMED_STRANGERS:
             named_hosts.add(host)
             self._notices.append(f"{host} {text}")

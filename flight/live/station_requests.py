@@ -54,7 +54,7 @@ class Parameter:
 
 
 def _empty_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
-    """Return no parameters."""
+    """Return no parameters; stands for the parameters of a vehicle without a simulated autopilot."""
     return {}
 
 
@@ -164,7 +164,8 @@ def vehicle_parameters(
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
-    autopilot_values: function as in `Parameters`; its names replace the vehicle's own.
+    autopilot_values: function that returns the simulated autopilot's parameters by name, from the values that stations
+        have set. They replace parameters of the vehicle with the same name.
     not_simulated: parameters that are read but not simulated; they cannot be set.
 
     >>> parameters = vehicle_parameters(
@@ -361,7 +362,11 @@ class Requests:
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
     ) -> tuple[CommandResult, list[Any]]:
-        """Send a message once, or set or get its interval, as a command asks; return the result and the messages."""
+        """Send a message once, or set or get its interval; return the result and the messages to send.
+
+        number: MAV_CMD of the command.
+        message: COMMAND_LONG or COMMAND_INT that carries the command.
+        """
         implied_number = _MESSAGE_COMMANDS[number]
         requested_number = _to_integer(message.param1) if implied_number is None else implied_number
         message_class = mavlink.mavlink_map.get(requested_number)
