@@ -54,7 +54,7 @@ class TakeOff:
     speed: float
     acceleration: float
 
-    def release(self) -> tuple[Floats, Floats]:
+    def release_state(self) -> tuple[Floats, Floats]:
         """Return the position (m) and the velocity (m/s) at the end of the launch, each (3,) east, north, up.
 
         The release is the end of the rail, the throw of a hand launch, or the start of a runway. On a runway the

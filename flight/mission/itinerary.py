@@ -579,8 +579,8 @@ class _ItineraryBuilder:
             elif not self.stops:
                 self.add_open_item("NAV_RETURN_TO_LAUNCH before the start is not flown", target.seq)
             else:
-                # The RTL ends the mission.  The autopilot chooses destination and altitude:
-                # `flight.mission.return_path`.  Earlier speed changes do not apply to the RTL.
+                # The RTL ends the mission. The autopilot chooses destination and altitude:
+                # `flight.mission.return_path`. Earlier speed changes do not apply to the RTL.
                 home = replace(target, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
                 self.stops.append(replace(self._make_stop(home), airspeed=math.nan, px4_airspeed=math.nan))
                 self.has_ended = True

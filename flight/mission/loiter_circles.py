@@ -49,9 +49,9 @@ def item_radius(loiter: Loiter) -> float:
 
 
 def unit_scale(up: float) -> float:
-    """Return the ratio of a loiter's flown radius to its stated radius: 1 at every altitude.
+    """Return 1, the ratio of flown to stated loiter radius for autopilots that fly the same radius at every altitude.
 
-    up: altitude, m AMSL. Some autopilots enlarge their loiters with altitude; this is the function for the others.
+    up: altitude of the loiter, m AMSL; not used.
     """
     return 1.0
 
@@ -70,8 +70,8 @@ class LoiterRules:
         center, and after the end of the loiter continues until it heads for the next waypoint within
         `EXIT_HEADING_TOLERANCE_RAD`.
     holds_height: True if the autopilot holds its altitude on the leg to a loiter to an altitude.
-    max_climb_rate, max_sink_rate: in a loiter, m/s.
-    altitude_tolerance: altitude tolerance, m.
+    max_climb_rate, max_sink_rate: limits in a loiter, m/s.
+    altitude_tolerance: difference from its altitude at which a loiter to an altitude is complete, m.
     ends_in_circle: True if the autopilot loiters indefinitely about a mission's last waypoint.
     unflown_note: note on parts of loiters that are not simulated; "" for none.
     rtl_exit_note: note on the exit from a loiter before an RTL, if the route has another exit.

@@ -147,7 +147,7 @@ class LineAxis:
     """
 
     def __init__(self, corners: Floats) -> None:
-        """Set up the axis of the line through corners (k, 2 or 3) m; k is at least 2."""
+        """Set up the axis of a line from its k corners, (k, 2) or (k, 3) m; k is at least 2."""
         self.corners = corners
         leg_vectors = np.diff(corners[:, :2], axis=0)
         self._lengths = np.hypot(*leg_vectors.T)
@@ -239,7 +239,7 @@ def camera_notes(
 ) -> tuple[str, ...]:
     """Return notes on trigger distances that contradict the camera's settings, or are too short for the camera.
 
-    airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
+    airspeed_factor: function that returns the ratio of true airspeed to the route's airspeeds at an altitude, m AMSL.
     """
     notes, spacings, courses = [], camera_spacing(mission, route)[:-1], leg_courses(route.positions)
     for plan in dict.fromkeys(mission.survey_plans):
@@ -549,8 +549,6 @@ def _make_survey(
     """Build a survey from successive lines; return None if they have too few different lateral positions.
 
     `_MIN_LINES` positions are needed, or `_MIN_LINES_WITH_PHOTOS` if photos are taken on every line.
-
-
     camera: distance between photos on each leg, (w,) m.
     turn_arounds: two distances for each survey of the ground station; see `find_surveys`.
     """
