@@ -84,7 +84,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 @inner
 def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
-    """Find the position along the path, store it in ``memory``, and return the course of the path there, rad.
+    """Find the aircraft's position along the path, store it in ``memory``, and return the path's course there, rad.
 
     The search starts at the piece of the last tick and never goes back.
 
@@ -107,7 +107,7 @@ def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
 
 
 @inner
-def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
+def pass_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
     """Advance the position in ``memory`` past sharp corners, to the leg that an autopilot already flies.
 
     An autopilot may turn to a leg before it passes the end of the previous leg.
@@ -315,7 +315,9 @@ def _ground_following_corners(
     value at the start of the leg to the value that the mission item at the end states. Places where the terrain is
     unknown have no corner.
 
+    leg: index of the leg.
     segment_start: east and north of the start of the leg's straight part, m, (2,).
+    course: course of the leg, rad.
     start_distance: distance of the straight part's start along the path, m.
     length: length of the straight part, m.
     """
@@ -397,11 +399,14 @@ def _fly_over_arcs(
 ) -> list[tuple[Floats, float, float, float]]:
     """Return the three arcs of a fly-over turn: start, course at the start, curvature and length of each.
 
-    The start is (2,), m; the course is in rad, the curvature in 1/m, the length in m.  Two arcs turn past the course of
-    the next leg, and the third leads back onto that leg.  The first turn is divided because `project` is ambiguous for
-    larger angles.
+    The start is (2,), m; the course is in rad, the curvature in 1/m, the length in m. The first two arcs turn past the
+    course of the next leg, and the third leads back onto that leg. The turn past that course is split into two arcs
+    because `project` is ambiguous for larger angles.
 
-    turn: rad, positive to the right.
+    corner: position of the waypoint, (2,) m.
+    course: course of the leg to the waypoint, rad.
+    turn: course change at the waypoint, rad, positive to the right.
+    radius: radius of the arcs, m.
     """
     turn_sign, overshoot = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
     half_angle = 0.5 * (abs(turn) + overshoot)
@@ -577,13 +582,13 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     return points, (pieces["leg"] + (midpoints > pieces["leg_change"])).astype(np.int64)
 
 
-def arc_point(piece: Record, distance_along: float) -> tuple[float, float]:
+def point_on_piece(piece: Record, distance_along: float) -> tuple[float, float]:
     """Return east and north (m) on a piece, ``distance_along`` m from its start.
 
     piece: a record of `flight.guidance.path.PIECE`.
 
     >>> quarter = np.array([(0.0, 157.0, 0.0, 0.0, 0.0, 0.01, 0, math.inf)], PIECE)[0]
-    >>> east, north = arc_point(quarter, 50.0 * math.pi)
+    >>> east, north = point_on_piece(quarter, 50.0 * math.pi)
     >>> round(float(east), 6), round(float(north), 6)
     (100.0, 100.0)
     """
