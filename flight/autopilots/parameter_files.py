@@ -1,6 +1,6 @@
 """Read and write an autopilot's parameter files in the formats of ground stations.
 
-QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
+QGroundControl writes five columns with tabs between: vehicle, component, name, value, type. MAVProxy and ArduPilot's
 own default files have a name and a value with blanks between, Mission Planner has a comma.  In all formats a `#` begins
 a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's documentation, "Plain-Text File
 Format").
@@ -19,7 +19,7 @@ from world.files import TextLine, read_small_file, utf8_text
 MAX_BYTES = 4 * 2**20
 # Maximum length of a parameter name (MAVLink, PARAM_VALUE): no autopilot has a longer one.
 LONGEST_NAME = 16
-# Pattern of a name.  Files that were edited by hand contain names that are too long, which ground stations skip.  One
+# Pattern of a name. Files that were edited by hand contain names that are too long, which ground stations skip. One
 # name of ArduPlane 4.7 has small letters.
 _NAME_PATTERN = re.compile(r"[A-Z][A-Z0-9_]{0,63}|FOLLP_LkAHD")
 _NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")

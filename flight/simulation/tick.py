@@ -326,7 +326,7 @@ def end_tick(workspace: Record, block: Floats) -> int:
 
 @inner
 def airborne_end_code(workspace: Record) -> int:
-    """Return the code of the reason why an airborne flight ends in this tick, a key of `ENDS`; 0 if it continues."""
+    """Return the code of the condition that ends an airborne flight, a key of `ENDS`; 0 if it continues."""
     settings, air = workspace.settings, workspace.air
     return _find_airborne_end(
         workspace.state,
@@ -504,8 +504,8 @@ def _update_wind(
 ) -> None:
     """Write the mean wind and the next gust at the aircraft's position into the record ``air``.
 
-    The components are along true north, east and down.  The mean wind has no vertical component.  Without turbulence
-    (`wind.w20` is 0) the gust in the record stays as it is.
+    The components are along true north, east and down. The mean wind has no vertical component. Without turbulence
+    (`wind.w20` is 0) the gust in the record does not change.
 
     wind: record of `MEAN_WIND`.
     gusts, noise: state of the gust filters, and random numbers of the tick.

@@ -19,7 +19,7 @@ _FLOWN_BY_PROGRAM = ("ARSPD_USE", "RLL_RATE_P", "PTCH_RATE_P")
 
 @dataclass(frozen=True)
 class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
-    """ArduPlane itself.  Before the flight, the simulated ArduPlane stands in for the program."""
+    """ArduPlane itself. Before the flight, the simulated ArduPlane stands in for the program."""
 
     log_suffix: ClassVar = ".BIN"
 

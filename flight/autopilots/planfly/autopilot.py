@@ -73,7 +73,7 @@ class PlanflyGuidance(Autopilot):
 
     @property
     def deviations(self) -> Deviations:
-        """Altitude loss in downdrafts.
+        """Deviations of the guidance: it loses altitude in downdrafts, and otherwise follows its path exactly.
 
         In updrafts the guidance dives and flies faster, so it gains no altitude.
         """

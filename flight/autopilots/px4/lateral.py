@@ -103,7 +103,7 @@ def adapted_period(
     airspeed, wind_speed: m/s.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
-    # Without wind or curvature the period is that of a straight track.
+    # Without wind or curvature the period of a straight track applies.
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
     damping = parameters.npfg_damping

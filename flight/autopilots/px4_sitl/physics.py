@@ -1,7 +1,7 @@
 """Implement PX4's simulator link in lockstep, with sensor messages, socket and exchange.
 
-PX4 connects to the simulator by TCP with MAVLink.  Each HIL_SENSOR sets PX4's clock and triggers a step of PX4, which
-answers each step with one HIL_ACTUATOR_CONTROLS once its outputs run.  Follows PX4's
+PX4 connects to the simulator by TCP with MAVLink. Each HIL_SENSOR sets PX4's clock and triggers a step of PX4, which
+answers each step with one HIL_ACTUATOR_CONTROLS once its outputs run. Follows PX4's
 `src/modules/simulation/simulator_mavlink/SimulatorMavlink.cpp` and docs.px4.io, "Simulator MAVLink API".
 """
 
@@ -44,7 +44,7 @@ _FIX_3D = 3
 _SATELLITE_COUNT = 12
 # Stated accuracy of the GNSS position, m; the position is exact except for the error of the flight's navigation.
 _GNSS_ACCURACY_M = 0.9
-# PX4 treats a sensor whose value never changes as broken, and on the rail no value changes.  So noise of a little more
+# PX4 treats a sensor whose value never changes as broken, and on the rail no value changes. So noise of a little more
 # than PX4's quantum is added, the same in each flight: to the magnetic field ...
 _FIELD_NOISE_GAUSS = 2e-4
 # ... the specific force ...
@@ -204,7 +204,7 @@ class SimulatorPort:
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def pack(self, *messages: Any) -> bytes:
-        """Return the bytes of some messages, for `send`."""
+        """Return the bytes of some messages, which `send` accepts."""
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
@@ -251,7 +251,7 @@ class SimulatorPort:
 
         The actuator outputs in the data are appended to `_answers`.
 
-        A single call waits at most `_CHECK_INTERVAL_S`.  Raises ValueError before PX4 has connected.
+        A single call waits at most `_CHECK_INTERVAL_S`. Raises ValueError before PX4 has connected.
         """
         if self._stream is None:
             raise ValueError("PX4 has not connected")
@@ -294,7 +294,9 @@ _EARLY_ANSWER_TIMEOUT_S = 0.01
 
 
 class HilLockstep(Lockstep):
-    """Exchange over a `SimulatorPort`, with two steps of PX4, which samples its sensors at 250 Hz, in each frame.
+    """Exchange over a `SimulatorPort` that runs two steps of PX4 in each frame.
+
+    PX4 samples its sensors at 250 Hz, about twice the frame rate.
 
     port: socket to which PX4 connects.
     servos: servos of the controls; PX4's outputs of -1..1 (throttle 0..1) are fractions of their throw.
@@ -342,10 +344,11 @@ class HilLockstep(Lockstep):
         self._awaits_answer = True
 
     def boot(self, rail: RailEnd, has_started: Callable[[], bool], stall_time: float, startup_timeout: float) -> None:
-        """Wait until PX4's start-up script has ended.
+        """Run PX4 with the aircraft at rest until PX4's start-up script has ended.
 
         Meanwhile PX4 gets a step only when it waits for one.
 
+        rail: rail at whose start the aircraft stands.
         has_started: function that returns True once the script has ended.
         stall_time: time without an answer after which PX4 waits for a step, s by the clock.
         startup_timeout: s by the clock.
@@ -360,8 +363,8 @@ class HilLockstep(Lockstep):
             if self._port.receive_answer(stall_time) is None:
                 self.hold(rail)
 
-    def _receive_commands(self) -> Commands:
-        """Return the commands in the last outputs of PX4."""
+    def _next_commands(self) -> Commands:
+        """Return the commands in PX4's answer to the first step of the last frame, without waiting."""
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.value_at_fraction(outputs[ELEVATOR]),

@@ -64,7 +64,7 @@ class Px4Preflight(Conversation):
         )
 
     def start_mission(self) -> ConversationStep:
-        """Switch PX4 to mission mode.  Raises FlightError if PX4 refuses."""
+        """Switch PX4 to mission mode. Raises FlightError if PX4 refuses."""
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
         mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "was not armed and in mission mode")
         yield from self._wait_until(lambda: self._reported.mode == MISSION_MODE and self._reported.armed, mission_mode)

@@ -174,8 +174,8 @@ def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, f
 
 # Minimum distance from the release to the first waypoint, m.
 MIN_RUN_IN_DISTANCE_M = 500.0
-# Minimum time from the release to the first waypoint, s.  After the release the aircraft rises by 4 m and then sinks by
-# 6 m, because TECS integrated errors on the rail.  In the stored flights the altitude error was up to 2.2 m 20 s after
+# Minimum time from the release to the first waypoint, s. After the release the aircraft rises by 4 m and then sinks by
+# 6 m, because TECS integrated errors on the rail. In the stored flights the altitude error was up to 2.2 m 20 s after
 # the release, more at higher altitudes and in stronger winds, and the flights agreed with the simulated control law to
 # 0.5 m 5 s later.
 MIN_RUN_IN_TIME_S = 40.0
@@ -212,9 +212,9 @@ class SitlFlight(ProgramFlight):
     binary: file of the program.
 
     A flight that starts in the air stands on a rail until the autopilot is ready, then flies at least
-    `MIN_RUN_IN_DISTANCE_M` straight and level in the mean wind.  The track and the turbulence begin where the aircraft
-    passes the first waypoint, as in planfly's own flights.  The track of a flight from the ground begins at the end of
-    the launch, or at rest on the runway, and its mission is uploaded unchanged.  The GNSS position has the error of the
+    `MIN_RUN_IN_DISTANCE_M` straight and level in the mean wind. The track and the turbulence begin where the aircraft
+    passes the first waypoint, as in planfly's own flights. The track of a flight from the ground begins at the end of
+    the launch, or at rest on the runway, and its mission is uploaded unchanged. The GNSS position has the error of the
     setup's navigation.
 
     Raises FlightError, in one line that names the program, if the program does not start, uses another version of the

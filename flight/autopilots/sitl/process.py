@@ -26,12 +26,12 @@ _PANIC_MARK = "PANIC:"
 _PR_SET_PDEATHSIG = 1
 
 
-def check_binary(binary: Path, kind: str) -> str:
+def check_binary(binary: Path, title: str) -> str:
     """Check that an autopilot's program can be run, and return its SHA-256 as hex.
 
     Raises FlightError, in one line, if the program cannot be run.
 
-    kind: name of the expected autopilot.
+    title: name of the expected autopilot.
 
     >>> try:
     ...     check_binary(Path("missing/arduplane"), "ArduPlane")
@@ -40,7 +40,7 @@ def check_binary(binary: Path, kind: str) -> str:
     missing/arduplane: no such file; expected the SITL program of ArduPlane
     """
     if not binary.is_file():
-        raise FlightError(f"{binary}: {missing_text(binary)}; expected the SITL program of {kind}", file=binary)
+        raise FlightError(f"{binary}: {missing_text(binary)}; expected the SITL program of {title}", file=binary)
     if not os.access(binary, os.X_OK):
         raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
     try:
@@ -68,7 +68,7 @@ class Launch:
 class AutopilotProcess:
     """Running program of an autopilot, as a context manager.
 
-    Leaving the context kills the program and its children, and removes the program's folder.  A guard process does the
+    Leaving the context kills the program and its children, and removes the program's folder. A guard process does the
     same if planfly is killed.
 
     binary: file of the program, checked by `check_binary`.
