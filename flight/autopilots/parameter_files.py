@@ -59,6 +59,9 @@ def parameters_text(values: Mapping[str, float], title: str) -> str:
 
     The text has a comment, then a name and a value on each line.
 
+    values: values by name.
+    title: text of the comment.
+
     >>> parameters_text({"RTL_ALTITUDE": 180.0, "LAND_FLARE_SEC": 2.5}, "made for a field")
     '# made for a field\nRTL_ALTITUDE 180\nLAND_FLARE_SEC 2.5\n'
     """

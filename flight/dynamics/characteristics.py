@@ -132,8 +132,10 @@ def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_A
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Return the named modes of the linear dynamics with the (8, 8) matrix A of `flight.dynamics.trim.linearise`.
+    """Return the named modes of an aircraft's linear dynamics.
 
+    a: matrix A (8, 8) of `flight.dynamics.trim.linearise`.
+    airspeed: airspeed of the trim, m/s.
     The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
     and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is
     spiral.

@@ -370,7 +370,7 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Start a flight without a trim, for example at rest on the ground or at a hand launch.
+        """Release the aircraft in any state, without a trim, for example at rest on the ground or at a hand launch.
 
         position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.
@@ -421,12 +421,12 @@ class Fdm:
             setter(value)
 
     def set_wind(self, north: float, east: float, down: float) -> None:
-        """Set the steady wind: the velocity of the air, m/s."""
+        """Set the steady wind by the velocity of the air, m/s: its north, east and down components."""
         for setter, value in zip(self._wind_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
-        """Set the gust, which is added to the steady wind: the velocity of the air, m/s."""
+        """Set the gust, which is added to the steady wind, by its north, east and down components, m/s."""
         for setter, value in zip(self._gust_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 

@@ -263,6 +263,7 @@ def try_model(aircraft: Aircraft) -> None:
 def _run_trial(folder: str, _version: str) -> tuple[int | None, str]:
     """Load and step a model in another process; return its exit code, None on timeout, and its output.
 
+    folder: folder of the aircraft.
     _version: hash of the model; it is only used as a part of the cache's key.
     """
     # The child process finds planfly's packages where this process found them.

@@ -144,7 +144,10 @@ class ModelProgram:
 
 
 def frame_register(name: str, element: int = 0) -> int:
-    """Return the register of a field of the frame.
+    """Return the register of an element of a field of the frame.
+
+    name: name of a field of `flight.dynamics.compiled_frame.FRAME`.
+    element: index in the flattened field; 0 for a number.
 
     >>> frame_register("dt"), frame_register("attitude", 3)
     (0, 6)
@@ -459,7 +462,10 @@ def _element_text(element: Element) -> str:
 
 
 def _element_number(element: Element, *, attributes: Iterable[str] = ()) -> float:
-    """Return the number in an element. Raises UnsupportedModel for anything but a number."""
+    """Return the number in an element. Raises UnsupportedModel for anything but a number.
+
+    attributes: names of the attributes that the element may have.
+    """
     _check_element(element, attributes=attributes)
     return _parse_number(element, _element_text(element))
 

@@ -356,6 +356,8 @@ def slowest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim |
 def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     """Return the matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
 
+    simulator: JSBSim instance with the aircraft.
+    trim_point: the trim.
     The states are u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air). The commands are in
     the order of `flight.dynamics.state.Commands`. Actuators and motor have no lag. Altitude and course are constant.
     """

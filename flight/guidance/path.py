@@ -58,6 +58,9 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
     The distance is measured along the piece, m; it may be negative (before the start) or exceed the length of the
     piece. The cross-track error is in m, positive to the right. The course is the path's course at the projected point,
     rad.
+
+    piece: a record of `PIECE`.
+    east, north: position to project, m.
     """
     course, curvature = piece.course, piece.curvature
     offset_east, offset_north = east - piece.east, north - piece.north

@@ -65,6 +65,7 @@ def to_message(
 ) -> Any:
     """Convert an item to a MISSION_ITEM_INT message; latitude and longitude are rounded to 1e-7 degrees.
 
+    target_system, target_component: MAVLink ids of the receiver.
     current: True for the item that is flown now.
     seq: number of the item in the message; None for the item's own number.
     mission_type: list that the item belongs to; None to judge it by the item's command.
@@ -562,12 +563,16 @@ class MissionServer:
         return _item_request(upload.station, len(upload.items), mission_type)
 
     def _reject_upload(self, upload: _Upload, mission_type: MissionType, result: int, text: str) -> MissionReply:
-        """Discard an upload, and return the ACK with the reason."""
+        """Discard an upload, and return the ACK with a MAV_MISSION_RESULT and the reason."""
         del self._uploads[mission_type]
         return self._ack(upload.station, result, mission_type, f"{text}; nothing changed")
 
     def _ack(self, station: Station, result: int, mission_type: int, text: str = "") -> MissionReply:
-        """Return a MISSION_ACK for a station, with a text for all stations."""
+        """Return a MISSION_ACK for a station, with a text for all stations.
+
+        result: MAV_MISSION_RESULT.
+        mission_type: MAV_MISSION_TYPE that the message states.
+        """
         message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(mission_type))
         return MissionReply(station, message, text)
 
@@ -578,7 +583,11 @@ def _item_request(
     mission_type: MissionType,
     message_class: Any = mavlink.MAVLink_mission_request_int_message,
 ) -> MissionReply:
-    """Return the request for an item of an upload."""
+    """Return the request for an item of an upload.
+
+    seq: number of the item.
+    message_class: class of the request, MISSION_REQUEST_INT or MISSION_REQUEST.
+    """
     return MissionReply(station, message_class(station.system, station.component, seq, int(mission_type)))
 
 

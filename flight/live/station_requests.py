@@ -313,7 +313,7 @@ class Requests:
                 return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
         return []
 
-    def on_verdict(self) -> list[Response]:
+    def answer_waiting_arm_commands(self) -> list[Response]:
         """Return the responses to arm commands that have waited for the verdict."""
         waiting_commands, self._waiting_commands = self._waiting_commands, []
         replies: list[Response] = []
@@ -394,7 +394,12 @@ class Requests:
 
     @staticmethod
     def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
-        """Return the COMMAND_ACK for a station, and the text of the reply, if any."""
+        """Return the COMMAND_ACK for a station, and the text of the reply, if any.
+
+        system, component: MAVLink ids of the station.
+        number: MAV_CMD of the acknowledged command.
+        reply: result of the command and its text.
+        """
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
         replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:

@@ -442,7 +442,7 @@ class Vehicle:
         if not self.server.lists[MissionType.MISSION]:
             self.arming.on_mission_cleared()
             self.status.snapshot, self.status.home = self._standby
-            self._send_responses(self.requests.on_verdict())
+            self._send_responses(self.requests.answer_waiting_arm_commands())
             self._refresh_status()
             return
         if self.server.lists[MissionType.MISSION] is not self._start_item_upload:
@@ -550,7 +550,7 @@ class Vehicle:
         if verdict.start is not None and verdict.home is not None:
             self.status.snapshot, self.status.home = verdict.start, verdict.home
         self._progress.reset_current_item()
-        self._send_responses(self.requests.on_verdict())
+        self._send_responses(self.requests.answer_waiting_arm_commands())
         self._apply_state()
 
     def _handle_flight_end(self, end_reason: str) -> None:

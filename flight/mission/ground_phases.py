@@ -231,6 +231,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
     """Return the part of a route between take-off and landing, which the rules for flight in the air judge.
 
+    ground_phases: take-off and landing that are simulated.
     first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
 
     The waypoints before the end of the take-off are moved to the start of the first leg, 1 m apart. The leg to the

@@ -300,9 +300,13 @@ def _nearest_return_target(
     rally: Sequence[ReturnPoint],
     landing: LandingStart,
 ) -> ReturnTarget:
-    """Return the nearest destination: the mission's landing, a rally point or, if the rules include it, home.
+    """Return the nearest destination: the landing, a rally point or, if the rules include it, home.
 
-    The distance to the landing is measured to its landing point (`RTL::findRtlDestination` in PX4's `rtl.cpp`).
+    The distance to the mission's landing is measured to its landing point (`RTL::findRtlDestination` in PX4's
+    `rtl.cpp`).
+
+    start: east, north, up at the start of the RTL, m AMSL.
+    home_target: home as a destination.
     """
     point = ReturnPoint(*(landing.landing or landing.position))
     transit, _ = _transit_and_end_altitudes(rules, start, point.up, 0.0)

@@ -271,7 +271,10 @@ def camera_notes(
 
 
 def with_photo_spacing(mission: Mission, survey: Survey, spacing: float) -> Mission:
-    """Return the mission with another distance between the photos of a survey, m, in its items and its settings."""
+    """Return the mission with another distance between a survey's photos, in its items and settings.
+
+    spacing: new distance, m.
+    """
 
     def has_spacing(value: float | None) -> bool:
         """Return True if a value is the distance between photos of the survey."""

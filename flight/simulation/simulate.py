@@ -199,7 +199,7 @@ class LocalMap:
         )
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
-        """Return the grid convergence at a position, rad: the map course of true north."""
+        """Return the grid convergence, the map course of true north, at a position (degrees), rad."""
         lon = self.center_longitude + math.remainder(math.radians(lon_deg) - self.center_longitude, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
 
@@ -496,7 +496,7 @@ class RunningFlight:
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         if launch_end is not None:
-            self._work.commands = release(self.fdm, launch_end, commands)
+            self._work.commands = release_aircraft(self.fdm, launch_end, commands)
             self._work.air.wind_north, self._work.air.wind_east = launch_end.wind[:2]
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
@@ -653,11 +653,12 @@ def _to_true_north(east: float, north: float, convergence: float) -> tuple[float
     return north * cos + east * sin, east * cos - north * sin
 
 
-def release(
+def release_aircraft(
     fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Put the aircraft into the state at the end of its launch, with control commands; return these commands.
+    """Put the aircraft into the state at the end of its launch, with control commands; return them.
 
+    release_state: position, attitude, velocity, wind and ground at the release.
     commands: elevator, aileron, rudder (rad) and throttle (0..1).
     """
     fdm.release(

@@ -56,7 +56,9 @@ _PRESSURE_NOISE_HPA = 5e-3
 
 
 def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
-    """Return the Earth's magnetic field (north, east, down), gauss, from pymavlink's tables.
+    """Return the Earth's magnetic field (north, east, down) at a position, gauss, from pymavlink's tables.
+
+    lat_deg, lon_deg: degrees.
 
     >>> north, east, down = earth_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
@@ -361,7 +363,7 @@ class HilLockstep(Lockstep):
             if clock() - start > startup_timeout:
                 raise FlightError(f"did not start up within {startup_timeout:.0f} s", field="start-up")
             if self._port.receive_answer(stall_time) is None:
-                self.hold(rail)
+                self.step_on_rail(rail)
 
     def _next_commands(self) -> Commands:
         """Return the commands in PX4's answer to the first step of the last frame, without waiting."""
@@ -374,7 +376,11 @@ class HilLockstep(Lockstep):
         )
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
-        """Run two steps of PX4: with the motion halfway from the last frame to this one, and with this motion."""
+        """Run two steps of PX4: with the motion halfway from the last frame to this one, and with this motion.
+
+        motion: numbers of a `BodyMotion`.
+        battery: not used.
+        """
         current = BodyMotion(*motion)
         previous = self._last_motion or current._replace(time=current.time - 1.0 / FRAME_HZ)
         self._last_motion = current

@@ -82,7 +82,7 @@ class Px4Preflight(Conversation):
         self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
     def _set_mode(self, main_mode: int, sub_mode: int) -> None:
-        """Command a mode of PX4."""
+        """Command a flight mode by PX4's numbers of the main mode and the sub-mode."""
         self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main_mode, sub_mode)
 
 

@@ -139,9 +139,13 @@ class Conversation:
     def _wait_until(
         self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
     ) -> ConversationStep:
-        """Wait until a condition is true, and repeat a request every second.
+        """Wait until a condition is true, and meanwhile repeat a request every second.
 
-        Raises FlightError after a timeout.
+        is_done: function that returns True once the condition is true.
+        awaited: description of the condition, for the error, and its timeout.
+        request: function that sends the request; None to wait only.
+
+        Raises FlightError after the timeout.
         """
         stopwatch, last_request = self._start_stopwatch(), None
         while not is_done():
@@ -175,7 +179,7 @@ class Conversation:
         self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
 
     def _set_home(self, home: Home) -> None:
-        """Send home as a command."""
+        """Send the command that sets home."""
         item = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
         self._link.send(
             mavlink.MAVLink_command_int_message(

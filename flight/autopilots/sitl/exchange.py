@@ -271,7 +271,7 @@ class Lockstep(ABC):
         battery: volts and amperes; None for an aircraft without a battery.
         """
 
-    def hold(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
+    def step_on_rail(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
         """Run one frame with the aircraft on the rail, ``time_since_launch`` s after the acceleration began."""
         self._workspace.commands[:] = self._next_commands()
         motion = motion_on_rail(rail, self._next_time(), time_since_launch, self._home)
@@ -360,8 +360,8 @@ class Lockstep(ABC):
 
         return fly
 
-    def serve(self) -> None:
-        """Run one more frame at the end of a flight: apply the autopilot's commands, and send the motion to it."""
+    def answer_frame(self) -> None:
+        """Answer one more frame of a program that is ending: apply its commands, and send the motion to it."""
         self._fdm.write(self._next_commands())
         self.step()
 

@@ -32,7 +32,14 @@ from flight.guidance.path import profile_at, project
 from flight.mission.ground_phases import TakeOff
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S, Ground, Release, default_gear, find_release, release
+from flight.simulation.simulate import (
+    GROUND_TIME_ALLOWANCE_S,
+    Ground,
+    Release,
+    default_gear,
+    find_release,
+    release_aircraft,
+)
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -324,20 +331,20 @@ class SitlFlight(ProgramFlight):
                 # The simulated motion starts at the end of the launch, or at rest on the runway.
                 self._set_unit_factors()
                 commands = tuple(float(command) for command in self._workspace.commands)
-                self._work.commands = release(
+                self._work.commands = release_aircraft(
                     self.fdm, self._release, (commands[0], commands[1], commands[2], commands[3])
                 )
                 self._work.air.wind_north, self._work.air.wind_east = self._release.wind[:2]
                 self._make_loop(self._ground_tick)
 
     def _push(self, start_fraction: float = 0.0, end_fraction: float = 1.0) -> None:
-        """Accelerate the aircraft along the rail from one fraction of the push time to another."""
+        """Accelerate the aircraft along the rail from one fraction of the push time to another, each 0 to 1."""
         frames = math.ceil(self._rail.push_time * FRAME_HZ)
         for k in range(math.ceil(start_fraction * frames) + 1, math.ceil(end_fraction * frames) + 1):
-            self._lockstep.hold(self._rail, k / FRAME_HZ)
+            self._lockstep.step_on_rail(self._rail, k / FRAME_HZ)
 
     def save_log(self, target: Path) -> bool:
-        """End the program cleanly and move its log to a file; return True if there was a log."""
+        """End the program cleanly and move its log to the file ``target``; return True if there was a log."""
         self._process.end(self._answer_frame)
         return self._process.save_log(target)
 
@@ -354,7 +361,7 @@ class SitlFlight(ProgramFlight):
         """Hold the aircraft at rest on the rail during a step of the conversation with the program."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
-                self._lockstep.hold(self._rail)
+                self._lockstep.step_on_rail(self._rail)
             try:
                 next(step)
             except StopIteration:
@@ -407,7 +414,7 @@ class SitlFlight(ProgramFlight):
     def _answer_frame(self) -> bool:
         """Answer one more frame of a program that is about to end; return False if the program has ended."""
         try:
-            self._lockstep.serve()
+            self._lockstep.answer_frame()
         except FlightError:
             return False
         return True

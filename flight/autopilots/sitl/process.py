@@ -164,7 +164,7 @@ class AutopilotProcess:
         self._kill()
 
     def save_log(self, target: Path) -> bool:
-        """Move the program's last log to a file; return True if there was a log."""
+        """Move the program's last log to the file ``target``; return True if there was a log."""
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:
             return False

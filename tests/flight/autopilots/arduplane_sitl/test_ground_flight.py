@@ -156,5 +156,5 @@ def test_whoever_launches_waits_for_all_of_the_motor_where_it_runs_before(
     with AutopilotFlight(setup, AEROSONDE, autopilot, {}) as flight:
         began = flight.autopilot_time
         for _ in flight._wait_for_thrust():
-            flight._lockstep.hold(flight._rail)
+            flight._lockstep.step_on_rail(flight._rail)
         assert flight.autopilot_time - began == pytest.approx(seconds, abs=0.01)

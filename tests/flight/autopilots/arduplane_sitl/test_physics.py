@@ -459,7 +459,7 @@ def test_a_step_tells_the_motion_of_a_trimmed_flight(exchange: Exchange) -> None
 
 
 def test_the_batterys_volts_and_amperes_are_told(exchange: Exchange) -> None:
-    exchange.lockstep.hold(rail_end(exchange.fdm.read(), (-4.0, 0.0, 0.0)))
+    exchange.lockstep.step_on_rail(rail_end(exchange.fdm.read(), (-4.0, 0.0, 0.0)))
     exchange.fdm.write(exchange.trim.commands())
     exchange.lockstep.step()
     resting, flying = (told["battery"] for told in exchange.port.told)
@@ -512,7 +512,7 @@ def test_satellites_mistake_what_is_told_on_the_rail_and_off_it(exchange: Exchan
     lockstep, told = exchange.lockstep, exchange.port.told
     for error in ((0.0,) * 6, (1.0, 2.0, 3.0, 0.1, 0.2, 0.3)):
         lockstep.error = error
-        lockstep.hold(rail)
+        lockstep.step_on_rail(rail)
     right, wrong = told
     assert np.subtract(wrong["position"], right["position"]) == pytest.approx([1.0, 2.0, -3.0], abs=1e-3)
     assert np.subtract(wrong["velocity"], right["velocity"]) == pytest.approx([0.1, 0.2, -0.3], abs=1e-3)
@@ -523,6 +523,6 @@ def test_satellites_mistake_what_is_told_on_the_rail_and_off_it(exchange: Exchan
 
 def test_a_look_is_taken_every_tenth_of_a_second(exchange: Exchange) -> None:
     for _ in range(3 * POLL_INTERVAL_FRAMES):
-        exchange.lockstep.serve()
+        exchange.lockstep.answer_frame()
     assert exchange.looks == 3
     assert exchange.lockstep.time == pytest.approx(0.3)
