@@ -289,7 +289,7 @@ class Autopilot(ABC):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds: kind, limits and minimum ground speed."""
+        """Rules of airspeeds: true or equivalent airspeeds, their limits, and the minimum ground speed."""
         return SpeedRules()
 
     @property

@@ -201,7 +201,7 @@ class LoopAccess:
 
 
 class Fdm:
-    """One aircraft in one JSBSim instance, from a trimmed start; create a new one for each flight.
+    """One aircraft in one JSBSim instance; create a new one for each flight.
 
     rate_hz: steps per second.
     motor_braking: True if the motor may brake the propeller (current below zero).

@@ -37,7 +37,7 @@ _PART_ELEMENTS = frozenset({"engine", "tank", "contact", "thruster"})
 
 
 class _Reader:
-    """Collects the property names from one file's XML events, and stops at the first forbidden element.
+    """Reader that collects the property names of one XML file, and stops at the first forbidden element.
 
     main: True for the model itself, False for a file that it includes.
     remove_channels: True to note ``<input>`` and ``<output>`` channels for removal instead of refusing them.

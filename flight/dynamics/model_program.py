@@ -479,7 +479,10 @@ def _parse_number(element: Element, text: str) -> float:
 
 
 def _clip_limits(element: Element) -> tuple[float, float] | None:
-    """Return the lower and upper limit of a component, or None if it has no limits."""
+    """Return the lower and upper limit of a component, or None if it has no limits.
+
+    Raises UnsupportedModel if it has only one of them.
+    """
     clip = element.find("clipto")
     if clip is None:
         return None

@@ -33,7 +33,7 @@ WAYPOINT = record_dtype(
     ("exits_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
     ("exits_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
     "exit_bearing",  # rad, 0 < it <= 2 pi, to which ArduPlane exits a loiter; 0 for the bearing to the next waypoint
-    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; radius, center and up are then those of the RTL loiter
+    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; radius, center and up describe the RTL loiter
     ("stop", np.int64),  # its stop of the route: a jump back leads to another stop of the same item
     ("is_gate", np.bool_),  # True for a CONDITION_GATE, which is no target
     ("is_mission_end", np.bool_),  # True if the mission ends there without a landing or an RTL

@@ -512,7 +512,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
                 waypoints["exit_bearing"][is_loiter] = bearing % (2.0 * math.pi) or 2.0 * math.pi
         waypoints["turn"][last_before_return] = turn
     if mission is not None:
-        # The waypoint before a landing, and those of a landing sequence, as `MissionBase::isLanding` of PX4 defines it.
+        # The waypoint before a landing, and the waypoints of a landing sequence as PX4's `MissionBase::isLanding` says.
         flown_commands = PLACES | TAKEOFFS | LANDINGS
         flown_items = [item for item in mission.items if item.command in flown_commands and item.has_position]
         last_items = [item.seq for item, next_item in pairwise(flown_items) if next_item.command in LANDINGS]

@@ -174,7 +174,7 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def on_mission_uploaded(self) -> None:
-        """Set the state for an uploaded mission whose verdict is awaited."""
+        """Record that a mission was uploaded whose verdict is awaited."""
         self.is_judging, self.mission_state = True, NOT_STARTED
 
     def on_mission_judged(self, verdict: MissionJudged) -> str:
@@ -198,7 +198,7 @@ class ArmingState:
             self.mode = MANUAL
 
     def on_flight_started(self) -> None:
-        """Set the state of a started flight."""
+        """Record that the flight has started."""
         self.flying, self.mission_state = True, ACTIVE
 
     def on_flight_ended(self, is_completed: bool) -> None:

@@ -274,7 +274,7 @@ def send_event(connection: Connection, event: Event) -> None:
 
 
 def read_event(data: bytes) -> Snapshot | Event:
-    """Read an event from the flight process."""
+    """Return the event or the snapshot in bytes that the flight process has sent."""
     if data[:1] == _PACKED_MARK:
         return Snapshot.unpack(data[1:])
     return pickle.loads(data[1:])

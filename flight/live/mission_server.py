@@ -481,10 +481,10 @@ class MissionServer:
         is_float = message.get_type() == "MISSION_ITEM"
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, mission_type, _FLOAT_WARNING if is_float else "")]
 
-    def _send_count(
+    def _item_count_reply(
         self, _message: Any, station: Station, mission_type: MissionType, _now: float
     ) -> list[MissionReply]:
-        """Answer MISSION_REQUEST_LIST with the number of items of a list."""
+        """Return the number of items of a list, the answer to MISSION_REQUEST_LIST."""
         count = len(self.lists[mission_type])
         return [
             MissionReply(
@@ -493,8 +493,8 @@ class MissionServer:
             )
         ]
 
-    def _send_item(self, message: Any, station: Station, mission_type: MissionType, _now: float) -> list[MissionReply]:
-        """Answer MISSION_REQUEST_INT or MISSION_REQUEST with an item of a list."""
+    def _item_reply(self, message: Any, station: Station, mission_type: MissionType, _now: float) -> list[MissionReply]:
+        """Return an item of a list, the answer to MISSION_REQUEST_INT or MISSION_REQUEST."""
         items = self.lists[mission_type]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, mission_type)]
@@ -596,9 +596,9 @@ _HANDLERS = {
     "MISSION_COUNT": MissionServer._start_upload,
     "MISSION_ITEM_INT": MissionServer._receive_item,
     "MISSION_ITEM": MissionServer._receive_item,
-    "MISSION_REQUEST_LIST": MissionServer._send_count,
-    "MISSION_REQUEST_INT": MissionServer._send_item,
-    "MISSION_REQUEST": MissionServer._send_item,
+    "MISSION_REQUEST_LIST": MissionServer._item_count_reply,
+    "MISSION_REQUEST_INT": MissionServer._item_reply,
+    "MISSION_REQUEST": MissionServer._item_reply,
     "MISSION_CLEAR_ALL": lambda server, _message, station, mission_type, now: server._clear_lists(
         station, (mission_type,), mission_type, now
     ),

@@ -326,7 +326,7 @@ class Vehicle:
                 self.server.changed.add(kind)
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Serve until ``stop`` returns True, then end the flight and its process."""
+        """Serve stations until ``stop`` returns True; `close` then ends the flight and its process."""
         while not stop():
             self.step(_MAX_WAIT_S)
 

@@ -574,7 +574,7 @@ class _ReturnBuilder:
         self._add_circle(course, sweep)
 
     def _add_circle(self, course: float, sweep: float) -> None:
-        """Add the part of the loiter from the point with a course (rad) over an angle ``sweep`` around it (rad)."""
+        """Add the part of the loiter that begins at a course and sweeps an angle, both rad."""
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(
             *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.arc_radius)),

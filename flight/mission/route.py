@@ -800,7 +800,7 @@ def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
     """Return a function that computes the steepest climb and descent of a spiral, as tangents.
 
     In wind, the aircraft's slope limit depends on the course. A spiral passes through all courses, so the lowest limit
-    of eight courses counts, or the limit stated for every course if that is lower. The tangent of this limit is
+    of eight courses applies, or the limit stated for every course if that is lower. The tangent of this limit is
     multiplied by `SPIRAL_SLOPE_FRACTION`. The slope is `DEFAULT_SPIRAL_SLOPE` if there is no limit, or if the aircraft
     cannot climb or descend at all.
     """

@@ -558,7 +558,7 @@ def _make_survey(
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
     midpoints = np.array([runs.midpoint(line) for line in chain])
     _, offsets, _ = LineAxis(points[run_start : run_end + 1]).project(midpoints)
-    # Gaps between lines; a line flown twice counts once.
+    # Gaps between lines; a line flown twice is one line.
     all_gaps = [float(gap) for gap in np.diff(np.sort(offsets)) if gap >= _MIN_LINE_SPACING_M]
     gaps = []
     for k, gap in enumerate(all_gaps):

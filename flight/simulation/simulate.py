@@ -755,7 +755,7 @@ class Flight(RunningFlight):
         memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
-        # The compiled model flies only if its steps equal those of JSBSim.
+        # The compiled model flies only if its steps equal JSBSim's steps.
         self._compiled: CompiledModel | None = None
         if (engine or setup.engine) == "jsbsim":
             self.engine = "JSBSim, as requested"

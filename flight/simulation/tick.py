@@ -126,7 +126,7 @@ WORKSPACE_NUMBERS = WORKSPACE.itemsize // 8
 
 
 class Workspace:
-    """Record and path of one flight in one block of memory, with views of the data exchanged with JSBSim.
+    """Record and path of one flight in one block of memory, with views of the data that JSBSim reads and writes.
 
     Numba checks the type of each argument of a call, and takes twice as long for a record as for an array of numbers.
     Therefore all data is passed to compiled code as one block.

@@ -437,7 +437,7 @@ _MIN_ADDED_ROWS = 6_000
 
 
 class TrackBuilder:
-    """Build the track of a flight while it is flown, in half the memory of the flown rows.
+    """Builder of a flight's track while it is flown; it needs half the memory of the flown rows.
 
     >>> import numpy as np
     >>> builder = TrackBuilder()

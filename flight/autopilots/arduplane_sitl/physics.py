@@ -92,7 +92,7 @@ class PhysicsPort:
     """Socket to which an autopilot sends its servo outputs.
 
     port: its number.
-    watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
+    check_program: function that is called while nothing arrives; it raises FlightError if the program has ended.
 
     It sends nothing without a request. A repeated request for a frame, which the program sends after a timeout, gets
     the same answer again, and the aircraft does not move.
@@ -105,7 +105,7 @@ class PhysicsPort:
         # The kernel's own timeout: one system call a frame.
         check_interval = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, check_interval)
-        self.watch: Callable[[], None] = lambda: None
+        self.check_program: Callable[[], None] = lambda: None
         self._frame = -1
         self._last_answer = b""
         self._answered = 0.0
@@ -145,7 +145,7 @@ class PhysicsPort:
                     self._send(self._last_answer)
             now = self._clock()
             waiting_since = waiting_since or now
-            self.watch()
+            self.check_program()
             if now - waiting_since > SILENCE_TIMEOUT_S:
                 if data:
                     raise FlightError(

@@ -92,7 +92,7 @@ _NEUTRAL = {
     "FW_P_RMAX_NEG": _NeutralRange(60.0, math.inf),
     # No roll at all: 0 is no exception in `RollController::control_roll`.
     "FW_R_RMAX": _NeutralRange(1e-9, math.inf),
-    # A yaw rate below that of a turn, against which the rudder then steers (`YawController::control_yaw`).
+    # A limit below the yaw rate of a turn, against which the rudder then steers (`YawController::control_yaw`).
     "FW_Y_RMAX": _NeutralRange(20.0, math.inf),
     # No position: estimator, GPS, and a vehicle that is not armed.
     "EKF2_EN": _NeutralRange(1.0, 1.0, by_program=False),

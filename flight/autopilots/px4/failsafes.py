@@ -65,7 +65,7 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
 
 
 def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
-    """Return PX4's reaction to the loss of a radio link, "on" if it ignores the loss.
+    """Return the loss of a radio link, with PX4's reaction; the reaction is "on" if PX4 ignores the loss.
 
     use: "telemetry" for the ground station's link, "control" for the remote control.
     """

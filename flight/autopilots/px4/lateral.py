@@ -168,7 +168,9 @@ def heading_error_sine(air_east: float, air_north: float, reference_east: float,
 
 @inner
 def _look_ahead_angle(track_error: float, error_bound: float) -> float:
-    """Return the angle of the commanded bearing, rad: 0 at a right angle to the track, pi/2 along the track.
+    """Return the angle of the commanded bearing from the perpendicular to the track, rad.
+
+    It is 0 far from the track, where the bearing points to the track, and pi/2 on it, where the bearing leads along it.
 
     track_error: distance from the track, m.
     error_bound: result of `track_error_bound`, m.

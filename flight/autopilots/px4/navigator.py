@@ -3,17 +3,18 @@
 Follows PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and
 `src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`). A waypoint is reached within a radius of it or past the plane
 across the leg at it, and only within NAV_FW_ALT_RAD of its altitude; an aircraft that arrives too high or too low
-circles at the waypoint until it is within that tolerance. The radius is NAV_ACC_RAD, and up to 1.16 guidance's own
-switch distance if that is more; an item's own radius (its second parameter) is not read for fixed wing.
+circles at the waypoint until it is within that tolerance. The radius is NAV_ACC_RAD or, up to 1.16, the switch distance
+of the guidance if it is larger. PX4 ignores an item's own radius (its second parameter) for fixed wings.
 
-A loiter is flown around its center from the start of its leg (`control_auto_loiter`), which from a distance is straight
-to the center. It is reached, once, within that radius of its rim and near its altitude; then its time runs, and it is
-left at once for the line from its center to the next waypoint. Only if its item says so, it is left on the course to
-the next waypoint, or for a line that begins at the tangent point on the rim. LOITER_TIME demands its altitude from the
-start; LOITER_TO_ALT demands the altitude at the start of its leg until the rim is reached, and its own from then on.
+From the start of a loiter's leg PX4 guides the aircraft onto the circle (`control_auto_loiter`): from a distance it
+flies straight to the center. The loiter is reached within that radius of its rim and near its altitude, and its time
+runs from then on. When the time is over, the aircraft at once joins the line from the center to the next waypoint. If
+the item says so, it leaves on the course to the next waypoint, or joins a line that begins at the tangent point on the
+rim. LOITER_TIME demands its altitude from the start; LOITER_TO_ALT demands the altitude at the start of its leg until
+the rim is reached, and its own altitude from then on.
 
-At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it. A change of speed that the mission orders
-between them applies from where the aircraft crosses the plane through the gate. Once the last waypoint is reached, PX4
+The aircraft does not fly to a gate (CONDITION_GATE), but to the waypoint after it. A change of speed between the two
+items takes effect where the aircraft crosses the plane through the gate. Once the last waypoint is reached, PX4
 circles with NAV_LOITER_RAD: about that waypoint, up to 1.16 about the aircraft's position at that time
 (`setEndOfMissionItems`).
 """

@@ -162,7 +162,7 @@ class SimulatorPort:
     """Socket to which PX4 connects.
 
     port: number of the port.
-    watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
+    check_program: function that is called while nothing arrives; it raises FlightError if the program has ended.
     """
 
     def __init__(self) -> None:
@@ -170,7 +170,7 @@ class SimulatorPort:
         self._listener.bind((LOOPBACK, 0))
         self._listener.listen(1)
         self.port = int(self._listener.getsockname()[1])
-        self.watch: Callable[[], None] = lambda: None
+        self.check_program: Callable[[], None] = lambda: None
         self._stream: socket.socket | None = None
         self._mav = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._mav.robust_parsing = True
@@ -198,7 +198,7 @@ class SimulatorPort:
             try:
                 self._stream, _ = self._listener.accept()
             except TimeoutError:
-                self.watch()
+                self.check_program()
                 if self._clock() - start > timeout:
                     message = f"did not connect to the simulator within {timeout:.0f} s"
                     raise FlightError(message, field="simulator") from None
@@ -233,7 +233,7 @@ class SimulatorPort:
             start = self._clock()
             while not self._answers:
                 if not self._receive_data(timeout):
-                    self.watch()
+                    self.check_program()
                     if timeout <= _CHECK_INTERVAL_S or self._clock() - start > timeout:
                         return None
         return self._answers.pop(0)

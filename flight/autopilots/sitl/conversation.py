@@ -178,7 +178,7 @@ class Conversation:
         numbers = [float(value) for value in (*params, *(0.0,) * (7 - len(params)))]
         self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
 
-    def _set_home(self, home: Home) -> None:
+    def _send_home(self, home: Home) -> None:
         """Send the command that sets home."""
         item = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
         self._link.send(

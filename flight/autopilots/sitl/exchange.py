@@ -274,7 +274,7 @@ class Lockstep(ABC):
     def step_on_rail(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
         """Run one frame with the aircraft on the rail, ``time_since_launch`` s after the acceleration began."""
         self._workspace.commands[:] = self._next_commands()
-        motion = motion_on_rail(rail, self._next_time(), time_since_launch, self._home)
+        motion = motion_on_rail(rail, self._start_frame(), time_since_launch, self._home)
         north, east, up, velocity_north, velocity_east, velocity_up = self.error
         self._send_motion(
             motion._replace(
@@ -300,7 +300,7 @@ class Lockstep(ABC):
         current, current_factor = self._current
         self._send_motion(
             (
-                *(self._next_time(), p, q, r, *self._fdm.specific_force()),
+                *(self._start_frame(), p, q, r, *self._fdm.specific_force()),
                 *(north + error_north, east + error_east, home_amsl - amsl - error_up),
                 *(
                     roll,
@@ -365,8 +365,11 @@ class Lockstep(ABC):
         self._fdm.write(self._next_commands())
         self.step()
 
-    def _next_time(self) -> float:
-        """Start the next frame: poll the MAVLink connection if due, and return the time of the exchange, s."""
+    def _start_frame(self) -> float:
+        """Start the next frame, and return its time since the start of the exchange, s.
+
+        The MAVLink connection is polled in every `POLL_INTERVAL_FRAMES`th frame.
+        """
         self._frame += 1
         if self._frame % POLL_INTERVAL_FRAMES == 0:
             self._poll()

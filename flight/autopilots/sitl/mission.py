@@ -1,6 +1,6 @@
 """Build the mission that an autopilot gets to fly, from the items of the route and one extra waypoint.
 
-Items that a flight from air to air cannot contain, a take-off or a landing, become waypoints where the route has them.
+In a flight from air to air, take-off and landing items become waypoints where the route has them.
 An extra waypoint, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it accepts a
 waypoint a radius early, and returns to launch after the last one. A mission that ends with an RTL has the RTL at its
 end, or before the landing sequence that follows it, and its rally points are uploaded too. An unlimited loiter at the

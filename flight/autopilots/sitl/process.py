@@ -137,16 +137,18 @@ class AutopilotProcess:
         self._kill()
         self._resources.close()
 
-    def watch(self) -> None:
+    def check_running(self) -> None:
         """Raise FlightError, with the last line of the program's output, if the program has panicked or ended."""
-        panic = next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
+        panic = next(
+            (line.partition(_PANIC_MARK)[2].strip() for line in self.output_lines() if _PANIC_MARK in line), ""
+        )
         if panic:
             raise FlightError(f"panicked: {panic}", file=self.binary)
         code = self._process.poll()
         if code is None:
             return
         reason = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        output_lines = self.lines()
+        output_lines = self.output_lines()
         raise FlightError(
             reason + (f": {output_lines[-1]}" if output_lines else ""), file=self.binary, field="exit code", value=code
         )
@@ -196,8 +198,8 @@ class AutopilotProcess:
             self._signal(signal.SIGKILL)
         self._process.wait()
 
-    def lines(self) -> list[str]:
-        """Return the lines of the program's output; blank lines are left out."""
+    def output_lines(self) -> list[str]:
+        """Return the lines of the program's output without blank lines; an empty list if there is no output."""
         try:
             text = (self._folder / _OUTPUT_FILE).read_text(encoding="utf-8", errors="replace")
         except OSError:

@@ -149,7 +149,7 @@ def looked_at(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> Callable[..
     def begin(silence: float, leaps: dict[int, float] | None = None) -> Looks:
         looks = Looks(leaps)
         monkeypatch.setattr(physics, "SILENCE_TIMEOUT_S", silence)
-        port.watch, port._clock = looks, RunningClock(lambda: looks.now)
+        port.check_program, port._clock = looks, RunningClock(lambda: looks.now)
         looks.now += 0.1  # since the port was opened
         return looks
 
@@ -182,7 +182,7 @@ def test_what_was_asked_before_the_answer_came_has_had_it(
     port: PhysicsPort, autopilot: socket.socket, looked_at: Callable[..., Looks]
 ) -> None:
     looked_at(10.0)
-    port.watch = lambda: None
+    port.check_program = lambda: None
     for frame in (3, 3, 3):
         autopilot.send(packet(frame))
     port.receive()
@@ -235,7 +235,7 @@ def test_a_wait_watches_the_program(port: PhysicsPort) -> None:
     def gone() -> None:
         raise FlightError("ended")
 
-    port.watch = gone
+    port.check_program = gone
     with pytest.raises(FlightError, match="ended"):
         port.receive()
 
