@@ -111,10 +111,10 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     return entries
 
 
-def _parse_entry(line: str, where: TextLine) -> Entry:
+def _parse_entry(line: str, location: TextLine) -> Entry:
     """Return the parameter in a line without a comment.
 
-    where: position of the line.
+    location: position of the line.
 
     Raises ParameterError.
     """
@@ -126,20 +126,24 @@ def _parse_entry(line: str, where: TextLine) -> Entry:
         fields = _SEPARATOR_PATTERN.split(line)
         if len(fields) != 2:
             allowed = "expected a name and a value, or QGroundControl's five columns"
-            message = f"{where}: {_shorten(line)}: {allowed}"
-            raise ParameterError(message, file=where.file, value=line, allowed=allowed)
+            message = f"{location}: {_shorten(line)}: {allowed}"
+            raise ParameterError(message, file=location.file, value=line, allowed=allowed)
         name, text = fields
     if not _NAME_PATTERN.fullmatch(name):
         allowed = f"expected up to {LONGEST_NAME} capitals, digits and _"
-        message = f"{where}: name {_shorten(name)}: {allowed}"
-        raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
+        message = f"{location}: name {_shorten(name)}: {allowed}"
+        raise ParameterError(message, file=location.file, field="name", value=name, allowed=allowed)
     value = float(text) if _NUMBER_PATTERN.fullmatch(text) else math.nan
     if not math.isfinite(value):
         allowed = "expected a finite number"
         raise ParameterError(
-            f"{where}: {name}: {_shorten(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
+            f"{location}: {name}: {_shorten(text)}: {allowed}",
+            file=location.file,
+            field=name,
+            value=text,
+            allowed=allowed,
         )
-    return Entry(name, value, where, component)
+    return Entry(name, value, location, component)
 
 
 def _shorten(text: str) -> str:

@@ -285,17 +285,18 @@ def refuse_unknown_parameters(
     raise error
 
 
-def other_autopilot_error(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
+def other_autopilot_error(file_name: str, file_autopilot: str, evidence: str, flown_autopilot: str) -> ParameterError:
     """Return the error for a parameter file that was written for another autopilot.
 
-    where: the file, for the message.
-    written_for, flying: names of the autopilot of the file and of the autopilot that is to fly.
+    file_name: the file, for the message.
+    file_autopilot, flown_autopilot: names of the autopilot of the file and of the autopilot that is to fly.
     evidence: header or names that show the autopilot of the file.
     """
     evidence_text = f" ({evidence})" if evidence else ""
-    allowed = f"{_MODELS[flying]} is to fly; --autopilot {written_for} simulates {_MODELS[written_for]} instead"
-    message = f"{where}: written for {TITLES[written_for]}{evidence_text}, but {allowed}"
-    return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
+    option_text = f"--autopilot {file_autopilot} simulates {_MODELS[file_autopilot]} instead"
+    allowed = f"{_MODELS[flown_autopilot]} is to fly; {option_text}"
+    message = f"{file_name}: written for {TITLES[file_autopilot]}{evidence_text}, but {allowed}"
+    return ParameterError(message, file=file_name, field="autopilot", value=file_autopilot, allowed=allowed)
 
 
 def _read_text(path: Path) -> str:

@@ -245,7 +245,7 @@ def _set_friction(
     contact: Record,
     friction: Record,
     contact_index: int,
-    kind: int,
+    force_index: int,
     direction: Vector,
     arm: Vector,
     min_force: float,
@@ -253,18 +253,18 @@ def _set_friction(
 ) -> None:
     """Fill a friction record; limit the contact's last friction force to the range of the record.
 
-    kind: index of the force in the contact's friction: `_ALONG` or `_ACROSS` the wheel, or `_AGAINST` the motion.
+    force_index: index in the contact's friction: `_ALONG` or `_ACROSS` the wheel, or `_AGAINST` the motion.
     direction: unit vector of the friction force, in body axes.
     arm: ft, in body axes, from the center of gravity.
     min_force, max_force: lbf.
     """
     friction.contact = contact_index
-    friction.kind = kind
+    friction.kind = force_index
     friction.min_force = min_force
     friction.max_force = max_force
     set_vector(friction.direction, direction)
     set_vector(friction.arm, arm)
-    contact.friction[kind] = _limit(min_force, contact.friction[kind], max_force)
+    contact.friction[force_index] = _limit(min_force, contact.friction[force_index], max_force)
 
 
 @inlined

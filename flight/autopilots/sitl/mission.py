@@ -50,8 +50,8 @@ class UploadedMission:
 def make_uploaded_mission(setup: FlightSetup) -> UploadedMission:
     """Build the mission that is uploaded for a setup; its altitudes are AMSL, except at rally points.
 
-    A mission that begins and ends on the ground is uploaded unchanged. Raises ValueError if the setup simulates only a
-    take-off or only a landing, or if its mission has no home.
+    A mission that begins and ends on the ground is uploaded unchanged. Raises ValueError for a setup that
+    simulates only a take-off, only a landing, or both without a home.
     """
     if setup.ground_phases:
         # The mission as in its file; a home without an altitude gets the altitude of the ground.
