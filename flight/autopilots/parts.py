@@ -52,7 +52,7 @@ class ControlLaw:
     memory: type of the law's own record, in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
     initialise: initialises the records before the first tick; the arguments are a `GUIDANCE_MEMORY` record and a record
         of the type ``memory``, or None.
-    transfer_state: copies the state of the control law to the start of another route in flight; the arguments are the
+    transfer_state: copies the state of the control law when the flight changes to another route. The arguments are the
         record on the previous route, the record for the new route after ``initialise``, and the start (3,) of the new
         route, m.
     released_throttle: throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway, of a law

@@ -1,8 +1,8 @@
 """Serve the vehicle's stations on one UDP socket.
 
-A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or, on this machine, any message addressed
-to the vehicle, from an address that is allowed, and signed if a key is set. The table of stations is bounded; a silent
-station is removed from it.
+A station gets more than heartbeats only after it has sent a valid HEARTBEAT or, on this machine, any message addressed
+to the vehicle. The message must come from an allowed address, and be signed if a key is set. The table of stations is
+bounded; a silent station is removed from it.
 """
 
 import hashlib

@@ -532,7 +532,7 @@ class MissionServer:
         """Discard the upload of a station that cancels it (MISSION_ACK with an error).
 
         After some unanswered requests the vehicle sends MISSION_REQUEST instead of MISSION_REQUEST_INT. A station that
-        refuses the former as unsupported gets the latter again.
+        refuses MISSION_REQUEST as unsupported gets MISSION_REQUEST_INT again.
         """
         upload = self._uploads.get(mission_type)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:

@@ -64,8 +64,8 @@ class LoiterRules:
     radius_name: name of the parameter of that radius; "" for none.
     radius_of: function that returns the radius that the autopilot reads from a loiter's item, m; 0 for none.
     radius_scale: function that returns the ratio of the flown radius at an altitude (m AMSL) to the stated radius.
-    steers_to_center: True if the autopilot steers to the loiter's center until it reaches the circle, and at the end of
-        the loiter leaves at once for the line from the center; otherwise it joins and leaves the circle on tangents.
+    steers_to_center: True if the autopilot steers to the loiter's center until it reaches the circle, and leaves at
+        once for the line from the center when the loiter ends; False if it joins and leaves the circle on tangents.
     exits_on_heading: True if the autopilot, after steering to the center, counts turns from its turn away from the
         center, and after the end of the loiter continues until it heads for the next waypoint within
         `EXIT_HEADING_TOLERANCE_RAD`.

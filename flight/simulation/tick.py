@@ -1,9 +1,9 @@
 """Define the record of a flight for the compiled loop, and the parts of a tick that all autopilots share.
 
-A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`);
-then an autopilot's control law fills in the commands; the tick ends with the next wind, a row of the track and the
-outputs to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, which consists of these two parts and
-its control law, and a compiled loop of such ticks, which reads the state (`read_state`) and steps the compiled model
+A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`).
+Then an autopilot's control law sets the commands. The tick ends with the next wind, a row of the track and the outputs
+to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, which consists of these two parts and its
+control law. Its compiled loop reads the state (`read_state`), runs such a tick, and steps the compiled model
 (`advance_model`).
 """
 

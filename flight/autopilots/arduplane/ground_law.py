@@ -3,18 +3,20 @@
 In the air the law is `flight.autopilots.arduplane.law`. Take-off and landing use the same law with other parameters
 and demands:
 
-Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): wings level until the ground speed has
-been above 5 m/s, in 4.6 for two seconds; then the course over the ground at that time is held as heading, less the yaw
-since the launch. Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up
-to TKOFF_LVL_ALT, unrestricted from three times that height. It ends above the item's altitude, or TKOFF_PLIM_SEC after
-leveling off began. The next leg begins at the aircraft, and follows no line.
+Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): the wings are level until the ground
+speed has been above 5 m/s (in 4.6 for two seconds). Then the aircraft holds a heading: the course over the ground at
+that time, less the yaw since the launch. The throttle is open. The pitch controls the airspeed, but is never below the
+pitch of the item. The bank is limited to LEVEL_ROLL_LIMIT up to TKOFF_LVL_ALT, and unrestricted from three times that
+height. The take-off ends above the item's altitude, or TKOFF_PLIM_SEC after leveling off began. The next leg begins at
+the aircraft, and follows no line.
 
-Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the extended line to the landing point, on the glide of
-`flight.autopilots.arduplane.landing`. The approach stage begins when the aircraft is lined up, or at once after a
-NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE. From then on the flare may begin: below LAND_FLARE_ALT,
-or LAND_FLARE_SEC before the ground at the current sink rate on the second half, or beyond the point. In the flare the
-motor is off, bank is at most LEVEL_ROLL_LIMIT, pitch at least LAND_PITCH_DEG, and pitch controls the sink rate to
-TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over airspeed. ArduPlane's real touchdown sink rate is
+Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): the aircraft follows the extended line to the landing point, on the
+glide of `flight.autopilots.arduplane.landing`. The approach stage begins when the aircraft is lined up, or at once
+after a NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE. From then on the flare may begin: below
+LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at the current sink rate on the second half of the line, or beyond
+the landing point. In the flare the motor is off, the bank is at most LEVEL_ROLL_LIMIT, and the pitch at least
+LAND_PITCH_DEG. The pitch controls the sink rate to TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over
+airspeed. ArduPlane's real touchdown sink rate is
 known less well: see `docs/measured.md`.
 """
 

@@ -316,8 +316,8 @@ class ArduPilotParameters(ParameterSet):
     rally_limit: maximum distance to the nearest rally point, m; an RTL ignores a rally point that is further away. 0
         for no limit.
     rally_includes_home: 1 if an RTL goes home when home is nearer than any rally point; 0 if not.
-    rtl_autoland: 0 if an RTL stays in its loiter; with 1 it continues to the mission's landing sequence, with 2 it goes
-        straight there; with 3 the sequence is for go-arounds only; with 4 it uses the mission's return path.
+    rtl_autoland: 0 if an RTL stays in its loiter. With 1 it continues to the mission's landing sequence, with 2 it
+        flies straight there. With 3 the sequence is for go-arounds only. With 4 the RTL uses the mission's return path.
     terrain_enable: 1 if ArduPlane has terrain data.
     terrain_lookahead: distance over which ArduPlane looks ahead for rising ground on a leg above terrain, m.
     terrain_spacing: distance between the samples of the terrain, m.

@@ -5,9 +5,9 @@ TECS with its limits. It controls a `flight.autopilots.point_mass.PointMass`, wh
 their demands with the lags of ArduPlane's controllers. The minimum clearance is within 7 m of the minimum clearances
 of 38 flights of ArduPlane (`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
 
-After an engine failure the control law does not know that there is no thrust: it demands full throttle, slows down to
-underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`), holds the minimum airspeed from then on, and dives
-onto its slope where it meets the slope. Fourteen such flights of ArduPlane are reproduced as well
+After an engine failure the control law does not know that there is no thrust: it demands full throttle and slows down
+to underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`). From then on it holds the minimum airspeed, and
+dives onto its slope where it meets the slope. Fourteen such flights of ArduPlane are reproduced as well
 (`tests/flight/autopilots/arduplane/test_engine_out.py`).
 """
 

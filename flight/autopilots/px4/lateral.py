@@ -2,8 +2,9 @@
 
 NPFG is by Furieri, Stastny, Marconi, Siegwart and Gilitschenski, "Gone with the wind: Nonlinear guidance for small
 fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), extended to any path in Stastny's "On Flying
-Backwards" (2019), in PX4's form (`src/lib/npfg/`): a course that closes in on the track and turns along it, the heading
-that flies this course in the wind, and a lateral acceleration proportional to the heading error.
+Backwards" (2019). In PX4's form (`src/lib/npfg/`) it has three steps: a course that closes in on the track and turns
+along it, the heading with which the aircraft flies this course in the wind, and a lateral acceleration proportional to
+the heading error.
 
 A track is a path over the ground. Courses and headings are angles from the map's north, clockwise; a signed error is
 positive to the right.

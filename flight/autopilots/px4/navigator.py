@@ -1,8 +1,8 @@
 """Navigate as PX4 does: choose the waypoint to fly to, accept it, and set the altitude setpoint on a leg.
 
 Follows PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and
-`src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`). A waypoint is reached within a radius of it or past the plane
-across the leg at it, and only within NAV_FW_ALT_RAD of its altitude; an aircraft that arrives too high or too low
+`src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`). A waypoint is reached within a radius of it, or past the plane
+through it across the leg, but only within NAV_FW_ALT_RAD of its altitude. An aircraft that arrives too high or too low
 circles at the waypoint until it is within that tolerance. The radius is NAV_ACC_RAD or, up to 1.16, the switch distance
 of the guidance if it is larger. PX4 ignores an item's own radius (its second parameter) for fixed wings.
 
