@@ -16,8 +16,7 @@ after a NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE. From then
 LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at the current sink rate on the second half of the line, or beyond
 the landing point. In the flare the motor is off, the bank is at most LEVEL_ROLL_LIMIT, and the pitch at least
 LAND_PITCH_DEG. The pitch controls the sink rate to TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over
-airspeed. ArduPlane's real touchdown sink rate is
-known less well: see `docs/measured.md`.
+airspeed. ArduPlane's real touchdown sink rate is known less well: see `docs/measured.md`.
 """
 
 import math
