@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance.path import FlyByPath, arc_point, profile_at
+from flight.guidance.path import FlyByPath, point_on_piece, profile_at
 
 
 def sample_path(path: FlyByPath, step: float) -> NDArray[np.float64]:
@@ -13,6 +13,6 @@ def sample_path(path: FlyByPath, step: float) -> NDArray[np.float64]:
     points = np.empty((distances.size, 3))
     for k, (number, distance) in enumerate(zip(numbers, distances, strict=True)):
         piece = path.pieces[number]
-        points[k, :2] = arc_point(piece, distance - piece.start)
+        points[k, :2] = point_on_piece(piece, distance - piece.start)
         points[k, 2] = profile_at(path.nodes, distance)[0]
     return points

@@ -1,1 +1,1 @@
-"""Autopilots that fly a mission: by their laws in Python, and as programs of their own."""
+"""Autopilots that fly a mission: simulated by their control laws, or as external programs."""

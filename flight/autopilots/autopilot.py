@@ -1,10 +1,10 @@
 """Define the interface through which the rest of planfly uses an autopilot.
 
-An `Autopilot` contains its own settings.  A `FlightSetup` contains an autopilot; planning, flights, verdicts and
-recordings use its operations and parts, and do not depend on which autopilot it is.  Each autopilot has a folder next
+An `Autopilot` contains its own settings. A `FlightSetup` contains an autopilot; planning, flights, verdicts and
+recordings use its operations and parts, and do not depend on which autopilot it is. Each autopilot has a folder next
 to this file; `flight.autopilots.catalog.AUTOPILOTS` lists all of them.
 
-A subclass must define `name`, `title` and `control_law`.  By default an autopilot has no parameters, and its parts
+A subclass must define `name`, `title` and `control_law`. By default an autopilot has no parameters, and its parts
 (`flight.autopilots.parts`) state that it flies the planned fly-by path at the commanded true airspeeds, and returns to
 launch as ArduPlane does with its default parameters.
 """
@@ -178,7 +178,7 @@ class Autopilot(ABC):
 
     name: name in `[flight] autopilot` of a scenario.
     title: name in texts.
-    answer_name: name of the answer that a flight gives.  "airframe": whether the aircraft can fly the mission.
+    answer_name: name of the answer that a flight gives. "airframe": whether the aircraft can fly the mission.
         "autopilot": whether the aircraft with this autopilot can; the verdict is compared with a reference flight by
         planfly's guidance.
     parameters: None for an autopilot without parameters.
@@ -289,7 +289,7 @@ class Autopilot(ABC):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds: kind, limits and minimum ground speed."""
+        """Rules of airspeeds: true or equivalent airspeeds, their limits, and the minimum ground speed."""
         return SpeedRules()
 
     @property

@@ -38,7 +38,7 @@ AUTOPILOTS = (
     Entry("px4", "px4.autopilot.Px4", ("1.16", "1.17")),
     Entry("planfly", "planfly.autopilot.PlanflyGuidance"),
 )
-# External programs.  The first one whose `accepts_program` is True for a file is used.
+# External programs. The first one whose `accepts_program` is True for a file is used.
 PROGRAMS = (
     "px4_sitl.autopilot.Px4Sitl",
     "arduplane_sitl.autopilot.ArduPlaneSitl",

@@ -10,7 +10,8 @@ _Version = TypeVar("_Version", bound=str)
 class FileRelease(NamedTuple):
     """Release of the autopilot that wrote a parameter file.
 
-    release: such as "4.5".  evidence: the comment or the name that shows it.
+    release: major and minor number, such as "4.5".
+    evidence: the comment or the parameter name that shows the release.
     """
 
     release: str
@@ -43,9 +44,10 @@ def commented_release(text: str, program: str) -> FileRelease | None:
 def nearest_release(versions: Sequence[_Version], release: tuple[int, int]) -> _Version:
     """Return the newest simulated release that is not newer than a release.
 
-    Without such a release, return the oldest simulated release.
+    If all simulated releases are newer, return the oldest of them.
 
     versions: the simulated releases, oldest first.
+    release: major and minor number.
 
     >>> [nearest_release(("1.16", "1.17"), release) for release in ((1, 15), (1, 16), (1, 18))]
     ['1.16', '1.16', '1.17']

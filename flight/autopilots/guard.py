@@ -1,7 +1,7 @@
 """Guard a flight's program: end the program and remove its folder if planfly is killed.
 
 The kernel kills a program whose parent is killed, but not that program's own children, such as the child of a wrapper
-script, and it removes no folder.  The guard is a small process that outlives planfly until both are done.
+script, and it removes no folder. The guard is a small process that outlives planfly until both are done.
 """
 
 import contextlib
@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-# Source of the guard process.  It reads commands until the line "done" or, if planfly was killed, the end of its input;
+# Source of the guard process. It reads commands until the line "done" or, if planfly was killed, the end of its input;
 # then it kills the process group, first so that nothing is written any more, and removes the folder and the files.
 _GUARD_SOURCE = """
 import os, shutil, signal, sys, time

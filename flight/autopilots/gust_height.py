@@ -4,9 +4,9 @@ from world.wind import W20, Turbulence
 
 # Gust with an exceedance probability of 1 %, in standard deviations.
 _GUST_SIGMAS = 2.33
-# Assumed duration of that gust, s.  In 303 flights of planfly's guidance in moderate turbulence (scenarios 4000 to 4599
+# Assumed duration of that gust, s. In 303 flights of planfly's guidance in moderate turbulence (scenarios 4000 to 4599
 # and 12000 to 12299 of `benchmarks.plans_and_verdicts`, three streams each) one leg in a hundred sank by 34 m with 0.3
-# to 1.2 m/s of spare climb rate, by 28 m with 1.4 m/s, by 21 m with 1.8 m/s and by 9 m with 3.5 m/s.  Of 132 legs of
+# to 1.2 m/s of spare climb rate, by 28 m with 1.4 m/s, by 21 m with 1.8 m/s and by 9 m with 3.5 m/s. Of 132 legs of
 # ArduPlane with 1.3 to 1.6 m/s of spare sink rate (two streams, from 16000) three in a hundred rose by 18 m and one by
 # 34 m; of 54 legs with 2 to 2.5 m/s none rose by 19 m.
 _GUST_DURATION_S = 12.0

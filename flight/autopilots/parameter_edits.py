@@ -53,7 +53,11 @@ def with_parameter(text: str, source: str, values: Mapping[str, float]) -> str:
 
 
 def px4_parameter_text(name: str, value: float, release: str) -> str:
-    """Return a parameter file of PX4 with one parameter, in QGroundControl's format."""
+    """Return the text of a parameter file of PX4 with one parameter, in QGroundControl's format.
+
+    name, value: the parameter, in PX4's unit.
+    release: release of PX4 that the header states, such as "1.16".
+    """
     head = ["Onboard parameters for Vehicle 1", "", "Stack: PX4 Pro", "Vehicle: Fixed Wing", f"Version: {release}", ""]
     head.append("Vehicle-Id Component-Id Name Value Type")
     comments = "".join(f"# {line}".rstrip() + "\n" for line in head)

@@ -1,6 +1,6 @@
 """Read and write an autopilot's parameter files in the formats of ground stations.
 
-QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
+QGroundControl writes five columns with tabs between: vehicle, component, name, value, type. MAVProxy and ArduPilot's
 own default files have a name and a value with blanks between, Mission Planner has a comma.  In all formats a `#` begins
 a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's documentation, "Plain-Text File
 Format").
@@ -19,7 +19,7 @@ from world.files import TextLine, read_small_file, utf8_text
 MAX_BYTES = 4 * 2**20
 # Maximum length of a parameter name (MAVLink, PARAM_VALUE): no autopilot has a longer one.
 LONGEST_NAME = 16
-# Pattern of a name.  Files that were edited by hand contain names that are too long, which ground stations skip.  One
+# Pattern of a name. Files that were edited by hand contain names that are too long, which ground stations skip. One
 # name of ArduPlane 4.7 has small letters.
 _NAME_PATTERN = re.compile(r"[A-Z][A-Z0-9_]{0,63}|FOLLP_LkAHD")
 _NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -58,6 +58,9 @@ def parameters_text(values: Mapping[str, float], title: str) -> str:
     r"""Return the text of a parameter file in a format that every ground station reads.
 
     The text has a comment, then a name and a value on each line.
+
+    values: values by name.
+    title: text of the comment.
 
     >>> parameters_text({"RTL_ALTITUDE": 180.0, "LAND_FLARE_SEC": 2.5}, "made for a field")
     '# made for a field\nRTL_ALTITUDE 180\nLAND_FLARE_SEC 2.5\n'
@@ -108,10 +111,10 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     return entries
 
 
-def _parse_entry(line: str, where: TextLine) -> Entry:
+def _parse_entry(line: str, location: TextLine) -> Entry:
     """Return the parameter in a line without a comment.
 
-    where: position of the line.
+    location: position of the line.
 
     Raises ParameterError.
     """
@@ -123,20 +126,24 @@ def _parse_entry(line: str, where: TextLine) -> Entry:
         fields = _SEPARATOR_PATTERN.split(line)
         if len(fields) != 2:
             allowed = "expected a name and a value, or QGroundControl's five columns"
-            message = f"{where}: {_shorten(line)}: {allowed}"
-            raise ParameterError(message, file=where.file, value=line, allowed=allowed)
+            message = f"{location}: {_shorten(line)}: {allowed}"
+            raise ParameterError(message, file=location.file, value=line, allowed=allowed)
         name, text = fields
     if not _NAME_PATTERN.fullmatch(name):
         allowed = f"expected up to {LONGEST_NAME} capitals, digits and _"
-        message = f"{where}: name {_shorten(name)}: {allowed}"
-        raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
+        message = f"{location}: name {_shorten(name)}: {allowed}"
+        raise ParameterError(message, file=location.file, field="name", value=name, allowed=allowed)
     value = float(text) if _NUMBER_PATTERN.fullmatch(text) else math.nan
     if not math.isfinite(value):
         allowed = "expected a finite number"
         raise ParameterError(
-            f"{where}: {name}: {_shorten(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
+            f"{location}: {name}: {_shorten(text)}: {allowed}",
+            file=location.file,
+            field=name,
+            value=text,
+            allowed=allowed,
         )
-    return Entry(name, value, where, component)
+    return Entry(name, value, location, component)
 
 
 def _shorten(text: str) -> str:

@@ -1,6 +1,6 @@
 """Find the autopilot and the vehicle that a parameter file was written for.
 
-QGroundControl writes both as comments at the head of the file ("# Stack: PX4 Pro", "# Vehicle: Fixed Wing").  In other
+QGroundControl writes both as comments at the head of the file ("# Stack: PX4 Pro", "# Vehicle: Fixed Wing"). In other
 files the names show them: PX4 and ArduPilot share hardly any, and ArduPilot's vehicles differ in the names of their
 controllers (parameter references of ArduPilot and PX4).
 """
@@ -20,7 +20,7 @@ PX4 = "px4"
 TITLES: Mapping[str, str] = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 _MODELS: Mapping[str, str] = {ARDUPILOT: "ArduPlane", PX4: "PX4", "planfly": "planfly's own guidance"}
 
-# A header counts as this many parameter names: the parameters below it may have been replaced.
+# Weight of a header in parameter names; it is low because the parameters below the header may have been replaced.
 _HEADER_WEIGHT = 3
 # A file belongs to an autopilot if the file has this many times as many names of it as of the other autopilot.
 _CLEAR_MAJORITY = 4
@@ -140,7 +140,7 @@ class ParameterOrigin(NamedTuple):
 def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin:
     r"""Return the autopilot and the vehicle for which a parameter file was written.
 
-    Each parameter name is a vote for the autopilot that has such a parameter, and a header counts as `_HEADER_WEIGHT`
+    Each parameter name is a vote for the autopilot that has such a parameter, and a header has `_HEADER_WEIGHT`
     votes. Without a majority of `_CLEAR_MAJORITY` to 1 the result is mixed.
 
     text: text of the file.
@@ -194,7 +194,7 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
 
 
 def _select_names(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
-    """Return those of ``names`` for which ``matches`` returns True, or a match of a pattern."""
+    """Return the names for which ``matches`` returns a true value, such as a match of a pattern."""
     return [name for name in names if matches(name)]
 
 
@@ -212,7 +212,7 @@ def _vehicle_by_majority(
 ) -> str:
     """Return the vehicle to which most parameter names of a file belong; "" for an aeroplane.
 
-    In a tie the vehicle is an aeroplane. A header that states the vehicle counts as much as `_HEADER_WEIGHT` names.
+    In a tie the vehicle is an aeroplane. A header that states the vehicle has the weight of `_HEADER_WEIGHT` names.
 
     text: text of the file.
     entries: parameters of the file by name.
@@ -258,7 +258,10 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 
 
 class UnusedParametersError(ParameterError):
-    """A parameter file of which the simulated autopilot uses no parameter.  model: title of this autopilot."""
+    """A parameter file of which the simulated autopilot uses no parameter.
+
+    model: title of this autopilot.
+    """
 
     model = ""
 
@@ -282,17 +285,18 @@ def refuse_unknown_parameters(
     raise error
 
 
-def other_autopilot_error(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
+def other_autopilot_error(file_name: str, file_autopilot: str, evidence: str, flown_autopilot: str) -> ParameterError:
     """Return the error for a parameter file that was written for another autopilot.
 
-    where: the file, for the message.
-    written_for, flying: names of the autopilot of the file and of the autopilot that is to fly.
+    file_name: the file, for the message.
+    file_autopilot, flown_autopilot: names of the autopilot of the file and of the autopilot that is to fly.
     evidence: header or names that show the autopilot of the file.
     """
     evidence_text = f" ({evidence})" if evidence else ""
-    allowed = f"{_MODELS[flying]} is to fly; --autopilot {written_for} simulates {_MODELS[written_for]} instead"
-    message = f"{where}: written for {TITLES[written_for]}{evidence_text}, but {allowed}"
-    return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
+    option_text = f"--autopilot {file_autopilot} simulates {_MODELS[file_autopilot]} instead"
+    allowed = f"{_MODELS[flown_autopilot]} is to fly; {option_text}"
+    message = f"{file_name}: written for {TITLES[file_autopilot]}{evidence_text}, but {allowed}"
+    return ParameterError(message, file=file_name, field="autopilot", value=file_autopilot, allowed=allowed)
 
 
 def _read_text(path: Path) -> str:

@@ -343,10 +343,10 @@ class ParameterSet:
         return find_contradictions(self.values, self.table.orders)
 
 
-def _value_error(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
+def _value_error(location: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
     """Return the error for a value that is not allowed.
 
-    where: line of the value, which the message names, or source of a recording, which it does not name.
+    location: line of the value, which the message names, or source of a recording, which it does not name.
     """
-    prefix, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
+    prefix, file = (f"{location}: ", location.file) if isinstance(location, TextLine) else ("", location)
     return ParameterError(f"{prefix}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)

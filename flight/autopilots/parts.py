@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # flight ends, otherwise 0.
 Tick = Callable[[Floats, Heights], int]
 
-# A number of ticks, each followed by the steps of a compiled model.  The arguments are block, heights, frames, numbers,
+# A number of ticks, each followed by the steps of a compiled model. The arguments are block, heights, frames, numbers,
 # code, contacts and frictions of a `flight.dynamics.compiled_model.CompiledModel`, and the number of ticks; returns the
 # status of the last tick.
 Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int], int]
@@ -52,7 +52,7 @@ class ControlLaw:
     memory: type of the law's own record, in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
     initialise: initialises the records before the first tick; the arguments are a `GUIDANCE_MEMORY` record and a record
         of the type ``memory``, or None.
-    transfer_state: copies the state of the control law to the start of another route in flight; the arguments are the
+    transfer_state: copies the state of the control law when the flight changes to another route. The arguments are the
         record on the previous route, the record for the new route after ``initialise``, and the start (3,) of the new
         route, m.
     released_throttle: throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway, of a law
@@ -76,7 +76,7 @@ class TurnRules:
     """Rules by which an autopilot turns to the next leg; by default it follows the fly-by path.
 
     acceptance_radius: default distance from a waypoint at which the autopilot turns to the next leg, m; None for an
-        autopilot that follows the fly-by path.  An autopilot with a radius also turns when it passes the line through
+        autopilot that follows the fly-by path. An autopilot with a radius also turns when it passes the line through
         the waypoint perpendicular to the leg.
     distance: returns the maximum distance before a waypoint at which the autopilot turns, m; the arguments are the turn
         at the waypoint, rad, positive (pi at the mission's end), and its altitude, m AMSL.
@@ -145,7 +145,7 @@ class SpeedRules:
 
     limits: limits of the airspeeds that the autopilot accepts from a mission, or None.
     equivalent: True if commanded airspeeds are equivalent airspeeds, which at altitude are lower than true airspeeds.
-    min_ground_speed: minimum ground speed until the mission sets another one, m/s; 0 for none.  The autopilot raises
+    min_ground_speed: minimum ground speed until the mission sets another one, m/s; 0 for none. The autopilot raises
         its airspeed to keep this ground speed.
     cruise_parameter: parameter of the cruise airspeed; "" without such a parameter.
     max_throttle: upper limit of the throttle in flight, 0..1; 1 for full throttle.
@@ -215,7 +215,7 @@ class RtlSettings(NamedTuple):
     field_depth: float = 0.0
 
 
-# Reaction of an autopilot to a failure.  "return": RTL; "land": the mission's landing sequence; "land here": a landing
+# Reaction of an autopilot to a failure. "return": RTL; "land": the mission's landing sequence; "land here": a landing
 # where the aircraft is; "autoland": mode AUTOLAND, or RTL without that mode; "on": continue the mission; "landed":
 # none, because the aircraft is on the ground; "never": none, because nothing can trigger the cause; the other reactions
 # do not lead home.
@@ -240,7 +240,7 @@ FailsafeAction = Literal[
 class LinkLossReaction(NamedTuple):
     """One reaction of an autopilot to the loss of a radio link in a mission.
 
-    action: what the autopilot does instead of its mission; "on" if it continues the mission.
+    action: reaction of the autopilot; "on" if it continues the mission.
     delay: time from the loss of the link to the reaction, s; inf for "on".
     parameter, value: the parameter that decides the reaction, and its value.
     """
@@ -311,8 +311,8 @@ class FlyReturns(Protocol):
 class ReturnTrials(NamedTuple):
     """Changes of parameters that may make an autopilot's RTLs safe, in the order in which they are tried.
 
-    altitudes: groups of parameters of the RTL's height, with their present values, m.  A trial sets all parameters of a
-        group to the same height, but lowers none.  The tried heights begin at the present value of the first parameter.
+    altitudes: groups of parameters of the RTL's height, with their present values, m. A trial sets all parameters of a
+        group to the same height, but lowers none. The tried heights begin at the present value of the first parameter.
     others: other changes, as values by name; each is tried alone and together with a greater height.
     text: names of all these parameters, in messages.
     """
@@ -331,9 +331,9 @@ class ReturnBehaviour:
 
     rules: rules of the RTL's target, altitude, turn and loiter.
     make_parameters: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
-    after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
+    after_link_loss: returns the reactions to the loss of a radio link, in order of time. If the mission continues, it
         is the reaction "on" alone, or () for an autopilot without parameters.
-    fly: simulates RTLs; None for an autopilot without an RTL, whose returns are simulated as those of ArduPlane.
+    fly: simulates RTLs; None for an autopilot without an RTL, for which ArduPlane's RTLs are simulated.
     flies_without_engine: True if ``fly`` also simulates RTLs after an engine failure.
     causes: returns the events that can end a mission, with the autopilot's reaction to each.
     unsimulated_text: returns the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
@@ -389,9 +389,9 @@ class GroundRules:
     """Rules of take-off, landing and go-around; by default the autopilot flies neither take-off nor landing.
 
     control_law: returns the control law that also flies a take-off and a landing; None for an autopilot that flies
-        neither.  The arguments are the take-off and landing, the aircraft, and its contact points.
+        neither. The arguments are the take-off and landing, the aircraft, and its contact points.
     needs_both_ends: True if the autopilot flies a take-off or a landing only in a mission that has both.
-    glide: returns the glide from the last waypoint before the landing point.  The arguments are height (m, positive)
+    glide: returns the glide from the last waypoint before the landing point. The arguments are height (m, positive)
         and horizontal distance (m, positive) of that waypoint from the landing point, the tail wind (m/s, negative for
         a head wind), and the altitude of the landing point (m AMSL).
     airspeed: returns the true airspeed on that glide, m/s; the arguments are the cruise airspeed, m/s, the tail wind,
@@ -486,7 +486,7 @@ class MissionParts(NamedTuple):
     takes_off, lands: True if the take-off or the landing is flown from or to the ground.
     loiters_to_land: True if the last item before a landing is a loiter.
     has_fence: True if the mission carries a fence.
-    fence_at_home: how home violates the mission's fence; "" if it does not.
+    fence_at_home: description of the mission's fence that home violates; "" for none.
     smallest_inclusion: radius of the fence's smallest inclusion circle, m; infinite without one.
     rally_distance: distance of the nearest rally point from home, m; infinite without one, NaN without a home.
     enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
@@ -535,8 +535,8 @@ def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
 class MissionChecks:
     """Reading and checks of missions, and the settings on which they depend; by default nothing is refused.
 
-    dialect: "ardupilot" refuses missions with a command that ArduPlane refuses.  "px4" refuses missions that fail PX4's
-        feasibility checks.  Of a change of speed PX4 reads only the value, and returns to its own airspeed for a value
+    dialect: "ardupilot" refuses missions with a command that ArduPlane refuses. "px4" refuses missions that fail PX4's
+        feasibility checks. Of a change of speed PX4 reads only the value, and returns to its own airspeed for a value
         that is not positive; it also reads gates.
     feasibility: settings of PX4's feasibility checks; PX4's defaults for another autopilot.
     resets_jump_counters: True if the autopilot resets a jump's counter when it is exhausted: a later pass over the jump
@@ -623,11 +623,11 @@ class Deviations:
 
     tracking_error: returns the deviations from the legs.
     gust_sink: returns the altitude loss in a downdraft with an exceedance probability of 1 %, m; 0 if the tracking
-        error includes it.  The arguments are the unused climb rate, m/s, and the turbulence.
+        error includes it. The arguments are the unused climb rate, m/s, and the turbulence.
     gust_rise: returns the altitude gain in an updraft with an exceedance probability of 1 %, m; 0 if the autopilot
-        holds its altitude.  The arguments are the unused sink rate, m/s, and the turbulence.
+        holds its altitude. The arguments are the unused sink rate, m/s, and the turbulence.
     altitude_miss_probability: returns the probability that gusts make the autopilot circle at a waypoint because of its
-        altitude; 0 if it always flies on.  The arguments are the unused climb and sink rates, m/s, and the turbulence.
+        altitude; 0 if it always flies on. The arguments are the unused climb and sink rates, m/s, and the turbulence.
     altitude_parameter: name of the parameter of the altitude tolerance, outside which the autopilot circles at a
         waypoint; "" if it always flies on.
     altitude_candidates, track_candidates: parameters that may cause an altitude or a track to fail.

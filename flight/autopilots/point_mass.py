@@ -1,7 +1,7 @@
 """Model an aircraft as a point mass for compiled code, with drag, thrust and power from its trims.
 
 Bank and pitch are inputs; the path angle is the pitch minus the angle of attack, which grows with the load factor.
-Specific excess power is the climb rate at constant airspeed.  It is interpolated from trims (states of steady flight)
+Specific excess power is the climb rate at constant airspeed. It is interpolated from trims (states of steady flight)
 by throttle, airspeed and altitude, and reduced by the additional induced drag of a bank.
 """
 
@@ -31,7 +31,7 @@ _THROTTLE_COUNT = 21
 _AIRSPEED_COUNT = 7
 # Altitudes of the grid, m AMSL.
 _ALTITUDES_M = (0.0, 2000.0, 4000.0)
-# Height above the start of a mission up to which the strongest wind of a forecast counts, m.
+# Height above the start of a mission up to which the strongest wind of a forecast is used, m.
 _MAX_WIND_HEIGHT_M = 2000.0
 
 # Bank beyond which the induced drag of a point mass does not increase further, rad.
@@ -39,7 +39,7 @@ _MAX_DRAG_BANK_RAD = 1.2
 # Lowest airspeed of a point mass, m/s.
 _MIN_AIRSPEED_MPS = 3.0
 
-# The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each
+# The aircraft as a point mass, for compiled code. Its tables have a row for each airspeed and a column for each
 # altitude of the grid.
 POINT_MASS = record_dtype(
     "airspeed",  # m/s, commanded, equivalent

@@ -26,7 +26,7 @@ class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):
 
     @abstractmethod
     def save_log(self, target: Path) -> bool:
-        """End the program cleanly and move its log to a file; return True if there was a log."""
+        """End the program cleanly and move its log to the file ``target``; return True if there was a log."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Judge the gains of an autopilot's rate controllers, which no simulated flight uses.
 
-The simulated autopilots follow an attitude with the lag of a tuned aircraft.  An attitude error e demands the rate
-e / T, with T the attitude's time constant.  The controller's output is F r + P (r - p) + I times the integral of r - p,
-for a demanded rate r and a rate p, and an output u gives the rate u / N in the end.  N is therefore the feed-forward of
-a tuned aircraft.  The fraction (F + P) / (N + P) of a demanded rate is reached at once; the rest is reached with the
+The simulated autopilots follow an attitude with the lag of a tuned aircraft. An attitude error e demands the rate
+e / T, with T the attitude's time constant. The controller's output is F r + P (r - p) + I times the integral of r - p,
+for a demanded rate r and a rate p, and an output u gives the rate u / N in the end. N is therefore the feed-forward of
+a tuned aircraft. The fraction (F + P) / (N + P) of a demanded rate is reached at once; the rest is reached with the
 time constant (N + P) / I.
 """
 
@@ -18,7 +18,7 @@ _MIN_IMMEDIATE_RESPONSE = 0.25
 # About twice the lag of an attitude of a tuned aircraft, s.
 _RESPONSE_TIME_S = 1.0
 # Highest bandwidth of the attitude loop, rad/s: servo, roll mode and filter, with lags of 0.05 to 0.15 s, oscillate at
-# 13 to 18 rad/s.  The fastest setting of ArduPlane's automatic tuning has 10 rad/s.
+# 13 to 18 rad/s. The fastest setting of ArduPlane's automatic tuning has 10 rad/s.
 _MAX_BANDWIDTH_RADPS = 12.0
 # Highest ratio of P to the feed-forward: a rate loop of two lags of 0.05 s and 0.02 s of delay oscillates at 5.7.
 _MAX_P_RATIO = 5.0

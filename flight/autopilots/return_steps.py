@@ -1,4 +1,4 @@
-"""Steps of a simulated RTL that do not depend on the autopilot, in compiled code: its start, clearances and loiter."""
+"""Implement the steps of a simulated RTL that are the same for every autopilot: its start, clearances and loiter."""
 
 import math
 

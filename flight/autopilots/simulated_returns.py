@@ -27,7 +27,7 @@ RETURN_OFF_TERRAIN = 3
 RETURN_TIMEOUT = 4
 # End of an RTL: it fell below the minimum clearance or distance that the caller demands.
 RETURN_ABORTED = 5
-# Outcome of one simulated RTL.  Times in s since the start; heights above ground and distances outside spheres in m.
+# Outcome of one simulated RTL. Times in s since the start; heights above ground and distances outside spheres in m.
 RETURN_RESULT = record_dtype(
     ("outcome", np.int64),  # `RETURN_ARRIVED` ... `RETURN_ABORTED`
     "end_time",
@@ -47,7 +47,7 @@ RETURN_RESULT = record_dtype(
     ("position_count", np.int64),  # number of stored positions
 )
 # An RTL has arrived at its loiter within this distance of its target (m), or within
-# `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of its radii.  Flights of ArduPlane were compared up to there.
+# `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of its radii. Flights of ArduPlane were compared up to there.
 LOITER_CAPTURE_RADIUS_M = 200.0
 # Depth below the ground to which an RTL that hits the ground is continued, m: this shows by how much it is too low, and
 # whether an RTL that barely hits the ground would hit again.

@@ -61,7 +61,7 @@ class Mode:
 
     @property
     def time(self) -> float:
-        """Time to half the amplitude, or to double it if the root is unstable, s."""
+        """Time in which the amplitude halves (unstable root: doubles), s; infinite for a zero real part."""
         return math.log(2.0) / abs(self.root.real) if self.root.real != 0.0 else math.inf
 
 
@@ -86,11 +86,11 @@ class StepResponse:
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Return level flights at evenly spaced airspeeds, from the aircraft's minimum to its maximum airspeed.
+    """Return level trims and their power at airspeeds from the aircraft's minimum to its maximum.
 
     An airspeed at which the aircraft cannot hold level flight is left out.
 
-    count: number of airspeeds.
+    count: number of evenly spaced airspeeds.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -132,8 +132,10 @@ def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_A
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Return the named modes of the linear dynamics with the (8, 8) matrix A of `flight.dynamics.trim.linearise`.
+    """Return the named modes of an aircraft's linear dynamics.
 
+    a: matrix A (8, 8) of `flight.dynamics.trim.linearise`.
+    airspeed: airspeed of the trim, m/s.
     The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
     and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is
     spiral.
@@ -157,7 +159,7 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 
 
 def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
-    """Return the response to each single control, from level flight at cruise and without guidance.
+    """Return the response to each control moved on its own, from level flight at cruise and without guidance.
 
     Each control moves by a tenth of its travel, because some models have actuators with play, in which a smaller
     movement would be lost. The elevator (up) and the throttle (down if it cannot be opened that much further) stay
@@ -192,9 +194,12 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 def _step_response(
     aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
-    """Simulate the response to a control that moves by ``size`` for ``hold_time`` s, over ``duration`` s.
+    """Simulate the response to one control that moves at 1 s from level flight at cruise.
 
-    size: rad, or fraction of full throttle.
+    control: name of the field of `flight.dynamics.state.Commands` that moves.
+    size: deflection, rad, or fraction of full throttle.
+    hold_time: time for which the control stays deflected, s.
+    duration: duration of the simulation, s.
     quantities: fields of `flight.dynamics.state.STATE` whose changes are returned.
     """
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)

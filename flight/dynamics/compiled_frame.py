@@ -3,7 +3,7 @@
 A step has JSBSim's order (FGFDMExec): Propagate, Inertial, Atmosphere, Winds, FCS, Auxiliary, Aerodynamics,
 GroundReactions, ExternalReactions, Aircraft, Accelerations. Propagate integrates the accelerations of the previous
 step, and the flight controls read the air data of the previous step. Units are JSBSim's: feet, slugs, pounds, rad and
-s. Facts and constants are those of JSBSim 1.3.
+s. Computations and constants are taken from JSBSim 1.3.
 """
 
 import math
@@ -231,8 +231,8 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
 def _integrate(frame: Record) -> None:
     """Integrate the motion over one time step, in inertial axes.
 
-    Attitude and rates are integrated by Euler's method, the velocity by the Adams-Bashforth method of second order, and
-    the position by that of third order.
+    Attitude and rates are integrated by Euler's method, the velocity by the second-order Adams-Bashforth method, and
+    the position by the third-order Adams-Bashforth method.
 
     frame: state and derivatives of the motion, a `FRAME` record; updated.
     """

@@ -93,7 +93,7 @@ class CompiledModel:
             raise UnsupportedModel("a flat earth")
         program = translate(fdm.model_text())
         self._fdm, self._program = fdm, program
-        # Register of each JSBSim property that the frame holds, by name, then those of the program.
+        # Register of each JSBSim property by name: properties of the frame first, then properties of the program.
         vector_registers = {
             name: frame_register(field, k)
             for field, names in _VECTOR_PROPERTIES.items()
@@ -181,7 +181,7 @@ class CompiledModel:
 
     @property
     def arrays(self) -> tuple[Records, Floats, Code, Records, Records]:
-        """Arguments of a `flight.autopilots.parts.Loop`."""
+        """Arrays of the model, in the order of the arguments of a `flight.autopilots.parts.Loop`."""
         return self.frames, self.numbers, self.code, self.contacts, self.frictions
 
     # ----------------------------------------------------------------------
@@ -241,7 +241,7 @@ class CompiledModel:
         initialise_attitude(self.frames, self._fdm.attitudes())
 
     def differing_properties(self) -> list[str]:
-        """Return the properties that currently differ in any bit."""
+        """Return the names of the properties and contact fields that now differ from JSBSim's in any bit."""
         numbers = self.numbers.tolist()
         differing = [
             name for name, (register, getter) in self._getters.items() if not _is_equal(numbers[register], getter())
@@ -273,7 +273,7 @@ def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz:
     xx, yy, zz: moments of inertia about the body axes, slug ft^2.
     xy, xz, yz: products of inertia, slug ft^2.
 
-    As in FGMassBalance, the sign convention of xz differs from that of the other products of inertia. The inverse has
+    As in FGMassBalance, xz has the opposite sign convention to the other products of inertia. The inverse has
     the elements k1 to k6, which are cofactors divided by the determinant.
     """
     ixz = -xz

@@ -33,7 +33,7 @@ _SCHEMA_VERSION = 7
 _AIRSPEED_COUNT = 11
 # Altitudes of the grid, m AMSL.
 _GRID_AMSL_M = np.arange(0.0, 9001.0, 1000.0)
-# Smallest change of an acceleration by a command that has an effect, m/s^2 or rad/s^2; an engine settles to 1e-8.
+# A command that changes accelerations by less has no effect, m/s^2 or rad/s^2; an engine settles to 1e-8.
 _MIN_RESPONSE = 1e-5
 # Names of all tables in the file.
 _TABLE_NAMES = (*TABLES, *POWERS)
@@ -45,7 +45,9 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     The cached and the computed envelope are identical. A cache file is replaced if it is unreadable or damaged, or if
     it is for another model, JSBSim or schema. It is not replaced if its folder is not writable. The uncertainty in the
     aircraft's folder is added. For a model made from a data sheet, the lowest airspeeds are raised so that sea level
-    has the stated stall speed.
+    has at least the stated stall speed.
+
+    motor_braking: True if the motor may brake the propeller.
 
     Raises FlightError for a model that JSBSim cannot load.
 
@@ -99,7 +101,10 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
 
 
 def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:
-    """Return the cache file of an aircraft's envelope."""
+    """Return the path of the cache file for an aircraft's envelope.
+
+    motor_braking: True if the motor may brake the propeller.
+    """
     kind = "braking" if motor_braking else "coasting"
     name = f"envelope-{aircraft.name}-{model_hash(aircraft)[:16]}-{kind}-v{_SCHEMA_VERSION}.json"
     return Path(user_cache_dir("planfly")) / name
@@ -109,6 +114,8 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     """Return the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
 
     The trims are in still standard atmosphere, at 45 degrees latitude, on a course due north.
+    motor_braking: True if the motor may brake the propeller.
+
     Raises FlightError for a model whose elevator or throttle has no effect, because it has no trims.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)

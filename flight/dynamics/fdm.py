@@ -201,7 +201,7 @@ class LoopAccess:
 
 
 class Fdm:
-    """One aircraft in one JSBSim instance, from a trimmed start; create a new one for each flight.
+    """One aircraft in one JSBSim instance; create a new one for each flight.
 
     rate_hz: steps per second.
     motor_braking: True if the motor may brake the propeller (current below zero).
@@ -370,7 +370,7 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Start a flight without a trim, for example at rest on the ground or at a hand launch.
+        """Release the aircraft in any state, without a trim, for example at rest on the ground or at a hand launch.
 
         position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.
@@ -421,17 +421,17 @@ class Fdm:
             setter(value)
 
     def set_wind(self, north: float, east: float, down: float) -> None:
-        """Set the velocity of the air in the steady wind, m/s."""
+        """Set the steady wind by the velocity of the air, m/s: its north, east and down components."""
         for setter, value in zip(self._wind_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
-        """Set the velocity of the air in the gust, which is added to the steady wind, m/s."""
+        """Set the gust, which is added to the steady wind, by its north, east and down components, m/s."""
         for setter, value in zip(self._gust_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def loop_access(self) -> LoopAccess:
-        """Return the functions with which a fast loop reads and sets this instance."""
+        """Return the functions that a fast loop needs to read, set and step this instance."""
         commands = self.aircraft.model.commands
         names = [*(command.name for command in commands), *GUST, TERRAIN]
         return LoopAccess(
@@ -448,7 +448,7 @@ class Fdm:
         return self._start_position[2]
 
     def model_text(self) -> bytes:
-        """Return the XML of the model with its contacts."""
+        """Return the XML of the model, with the contacts of the gear if this instance has added one."""
         model = self.aircraft.model_file.read_bytes()
         return model if self._gear is None else with_contacts(model, self.aircraft, self._gear)
 

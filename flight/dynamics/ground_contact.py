@@ -29,7 +29,7 @@ from world.kernels import Record, Records, inlined, inner, record_dtype
 
 # Largest number of contacts of a model.
 MAX_CONTACTS = 16
-# A contact, its memory and its friction.
+# A contact: its constants, its internal state and its friction.
 CONTACT = record_dtype(
     ("arm", np.float64, (3,)),  # ft, along the body's axes from the center of gravity
     ("position", np.float64, (3,)),  # in, position in JSBSim's structural frame
@@ -108,7 +108,7 @@ def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tupl
 
 @inlined
 def _clear_contact(contact: Record) -> None:
-    """Clear the memory of a contact that is above the ground."""
+    """Reset the internal state of a contact that is above the ground."""
     contact.compression = contact.compression_speed = contact.slip_angle = 0.0
     friction = contact.friction
     friction[0] = friction[1] = friction[2] = 0.0
@@ -245,7 +245,7 @@ def _set_friction(
     contact: Record,
     friction: Record,
     contact_index: int,
-    kind: int,
+    force_index: int,
     direction: Vector,
     arm: Vector,
     min_force: float,
@@ -253,18 +253,18 @@ def _set_friction(
 ) -> None:
     """Fill a friction record; limit the contact's last friction force to the range of the record.
 
-    kind: element of the contact's friction: along, across, or against its motion.
+    force_index: index in the contact's friction: `_ALONG` or `_ACROSS` the wheel, or `_AGAINST` the motion.
     direction: unit vector of the friction force, in body axes.
     arm: ft, in body axes, from the center of gravity.
     min_force, max_force: lbf.
     """
     friction.contact = contact_index
-    friction.kind = kind
+    friction.kind = force_index
     friction.min_force = min_force
     friction.max_force = max_force
     set_vector(friction.direction, direction)
     set_vector(friction.arm, arm)
-    contact.friction[kind] = _limit(min_force, contact.friction[kind], max_force)
+    contact.friction[force_index] = _limit(min_force, contact.friction[force_index], max_force)
 
 
 @inlined

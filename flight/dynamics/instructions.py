@@ -85,7 +85,7 @@ def run_instructions(numbers: Floats, code: Code, start: int, end: int) -> None:
             divisor = numbers[code[first_operand + 1]]
             value = value / divisor if divisor != 0.0 else math.inf
         elif operation == Operation.MAX:
-            # From minus infinity on, like JSBSim, which so ignores operands that are not numbers.
+            # Start from minus infinity as JSBSim does, which therefore ignores operands that are NaN.
             value = -math.inf
             for k in range(first_operand, next_position):
                 operand = numbers[code[k]]

@@ -93,7 +93,7 @@ Setter = Callable[[float], object]
 
 
 class PropertyAccess:
-    """Properties of one JSBSim instance with a model.
+    """Access by name to the properties of one JSBSim instance with a model.
 
     manager: property manager of the instance.
     model_file: file named in errors.
@@ -103,7 +103,7 @@ class PropertyAccess:
         self._manager, self._model_file = manager, model_file
 
     def _node(self, name: str) -> Any:
-        """Return JSBSim's node of a property.  Raises FlightError if the property is undefined."""
+        """Return JSBSim's node of a property. Raises FlightError if the property is undefined."""
         # Reading a missing node would create it, so check for it first.
         node = self._manager.get_node(name) if self._manager.hasNode(name) else None
         if node is None:
@@ -136,10 +136,13 @@ class PropertyAccess:
         return self.getter(name)()
 
     def set(self, name: str, value: float) -> None:
-        """Set a property.  Raises FlightError if it is undefined."""
+        """Set a property. Raises FlightError if it is undefined."""
         self.setter(name)(value)
 
     def set_optional(self, name: str, value: float, default: float) -> None:
-        """Set a property; do nothing if the model lacks it and the value is its default."""
+        """Set a property; do nothing if the model lacks it and the value is its default.
+
+        Raises FlightError if the model lacks the property and the value is not its default.
+        """
         if value != default or self._manager.hasNode(name):
             self.set(name, value)

@@ -37,7 +37,7 @@ _PART_ELEMENTS = frozenset({"engine", "tank", "contact", "thruster"})
 
 
 class _Reader:
-    """Collects the property names from one file's XML events, and stops at the first forbidden element.
+    """Reader that collects the property names of one XML file, and stops at the first forbidden element.
 
     main: True for the model itself, False for a file that it includes.
     remove_channels: True to note ``<input>`` and ``<output>`` channels for removal instead of refusing them.
@@ -199,7 +199,7 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
 
 
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file after it has read the file; an unchanged file is read only once.
+    """Return a reader that has read a file; an unchanged file is read only once.
 
     main: True for the model itself, False for a file that it includes.
     remove_channels: True to note input and output channels for removal instead of refusing them.
@@ -211,7 +211,7 @@ def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
 
 @lru_cache(maxsize=16)
 def _read_stamped_model(file: Path, _stamp: tuple[int, ...] | None, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file after it has read the file; the stamp is a part of the cache's key."""
+    """Return a reader that has read a file; the stamp is only a part of the cache's key."""
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader
@@ -263,6 +263,7 @@ def try_model(aircraft: Aircraft) -> None:
 def _run_trial(folder: str, _version: str) -> tuple[int | None, str]:
     """Load and step a model in another process; return its exit code, None on timeout, and its output.
 
+    folder: folder of the aircraft.
     _version: hash of the model; it is only used as a part of the cache's key.
     """
     # The child process finds planfly's packages where this process found them.

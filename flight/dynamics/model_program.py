@@ -144,7 +144,10 @@ class ModelProgram:
 
 
 def frame_register(name: str, element: int = 0) -> int:
-    """Return the register of a field of the frame.
+    """Return the register of an element of a field of the frame.
+
+    name: name of a field of `flight.dynamics.compiled_frame.FRAME`.
+    element: index in the flattened field; 0 for a number.
 
     >>> frame_register("dt"), frame_register("attitude", 3)
     (0, 6)
@@ -357,7 +360,7 @@ class _Translator:
                     lag = math.nan if lag_element is None else _element_number(lag_element)
                     rate = math.inf if rate_element is None else _element_number(rate_element)
                     lower, upper = _clip_limits(component) or (-math.inf, math.inf)
-                    # The factors depend on the time step, and the memory on the start of the flight.
+                    # The factors depend on the time step, and the state on the start of the flight.
                     first_register = self._append_registers(*([math.nan] * LOWER_LIMIT), lower, upper)
                     self.actuators.append(ActuatorBlock(first_register, inputs[0], lag, rate))
                     output = self._property_register(_component_property(component))
@@ -459,7 +462,10 @@ def _element_text(element: Element) -> str:
 
 
 def _element_number(element: Element, *, attributes: Iterable[str] = ()) -> float:
-    """Return the number in an element. Raises UnsupportedModel for anything but a number."""
+    """Return the number in an element. Raises UnsupportedModel for anything but a number.
+
+    attributes: names of the attributes that the element may have.
+    """
     _check_element(element, attributes=attributes)
     return _parse_number(element, _element_text(element))
 
@@ -473,7 +479,10 @@ def _parse_number(element: Element, text: str) -> float:
 
 
 def _clip_limits(element: Element) -> tuple[float, float] | None:
-    """Return the lower and upper limit of a component, or None if it has no limits."""
+    """Return the lower and upper limit of a component, or None if it has no limits.
+
+    Raises UnsupportedModel if it has only one of them.
+    """
     clip = element.find("clipto")
     if clip is None:
         return None

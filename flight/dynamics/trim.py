@@ -120,7 +120,7 @@ def settle_step(steps: Sequence[float], previous_change: Sequence[float], change
     return min(max(time_constant, step / _MAX_STEP_CHANGE, min_step), step * _MAX_STEP_CHANGE, max_step)
 
 
-# Elements of a trim vector (8,), in this order, SI and radians.  Climb is the flight-path angle to the air mass, and
+# Elements of a trim vector (8,), in this order, SI and radians. Climb is the flight-path angle to the air mass, and
 # bank a rotation about the velocity; sideslip is zero.
 TrimQuantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
 # The same names as a tuple.
@@ -312,7 +312,7 @@ def steady_flight(
 def full_throttle_climb(
     simulator: Simulator, airspeed: float, amsl: float, initial_trim: Trim | None = None
 ) -> Trim | None:
-    """Return the steady climb at full throttle, or None without one.
+    """Return the steady climb at full throttle, or None if no trim is found.
 
     simulator: JSBSim instance with the aircraft.
     airspeed: m/s.
@@ -356,6 +356,8 @@ def slowest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim |
 def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     """Return the matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
 
+    simulator: JSBSim instance with the aircraft.
+    trim_point: the trim.
     The states are u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air). The commands are in
     the order of `flight.dynamics.state.Commands`. Actuators and motor have no lag. Altitude and course are constant.
     """

@@ -143,7 +143,9 @@ _UNIT_FACTORS = {
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
-    """Read the gains next to an aircraft's model. Raises FlightError if an entry is missing, unknown or invalid.
+    """Read the gains of an aircraft from its folder. Raises FlightError for a missing or invalid entry.
+
+    An unknown entry is invalid.
 
     >>> from aircraft.catalog import load_aircraft
     >>> load_gains(load_aircraft("aerosonde")).reference_airspeed

@@ -1,4 +1,4 @@
-"""Implement the inner loops of roll, pitch and yaw rate that all control laws share, and the memory of guidance."""
+"""Implement the inner loops of roll, pitch and yaw rate that all control laws share, and the state of the guidance."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, inner, record_dtype
 
-# Memory of the guidance from tick to tick, and values of one tick for the track.
+# Internal state of the guidance, kept from tick to tick, and values of the current tick for the track.
 GUIDANCE_MEMORY = record_dtype(
     # Set before the first tick.
     ("lateral_law", np.int64),  # lateral law of planfly's guidance: a value of `flight.autopilots.planfly.law.LAWS`
@@ -99,13 +99,12 @@ def steer_elevator(
 def step_roll_model(
     bank_demand: float, bank: float, roll_rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the roll model by one tick; return its bank (rad), roll rate and roll acceleration.
+    """Advance the roll model by one tick; return its bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
 
-    The roll rate is rad/s, the roll acceleration rad/s^2. The model is a critically damped oscillator with limits of
-    roll rate and roll acceleration.
+    The model is a critically damped oscillator with limits of roll rate and roll acceleration.
 
-    bank_demand, bank: rad.
-    roll_rate: rad/s.
+    bank_demand: bank that the model is to reach, rad.
+    bank, roll_rate: state of the model at the previous tick, rad and rad/s.
     """
     frequency = gains.roll_frequency
     acceleration_max, rate_max = gains.roll_acceleration_max, gains.roll_rate_max
@@ -129,8 +128,9 @@ def follow_roll(
 ) -> None:
     """Set aileron and rudder so that the aircraft follows the roll model.
 
+    memory: a `GUIDANCE_MEMORY` record; bank, roll rate and the estimated roll disturbance are stored in it.
+    commands: a `COMMANDS` record, whose aileron and rudder are set.
     bank, roll_rate, roll_acceleration: state of the roll model at this tick, rad, rad/s and rad/s^2.
-
     The aileron command has three parts: the deflection for the roll of the model, a feedback of the remaining error,
     and a compensation of gusts and propeller torque. Gusts and torque are estimated from the roll that the ailerons do
     not explain.

@@ -33,7 +33,7 @@ WAYPOINT = record_dtype(
     ("exits_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
     ("exits_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
     "exit_bearing",  # rad, 0 < it <= 2 pi, to which ArduPlane exits a loiter; 0 for the bearing to the next waypoint
-    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; radius, center and up are then those of the RTL loiter
+    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; radius, center and up describe the RTL loiter
     ("stop", np.int64),  # its stop of the route: a jump back leads to another stop of the same item
     ("is_gate", np.bool_),  # True for a CONDITION_GATE, which is no target
     ("is_mission_end", np.bool_),  # True if the mission ends there without a landing or an RTL
@@ -47,12 +47,12 @@ WAYPOINT = record_dtype(
 )
 
 
-def waypoint_column(count: int) -> Records:
-    """Return ``count`` records of `WAYPOINT`, all 0, with the memory stride that they have in a flight's path.
+def strided_waypoints(count: int) -> Records:
+    """Return ``count`` zeroed records of `WAYPOINT` in a strided array, as in the records of a flight's path.
 
-    The records are not contiguous, because Numba would compile every control law a second time for contiguous records.
+    Contiguous records would be another type for Numba, which would compile every control law a second time.
 
-    >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
+    >>> strided_waypoints(3).shape, strided_waypoints(3).flags.c_contiguous
     ((3,), False)
     """
     return np.zeros(2 * count, WAYPOINT)[::2]
@@ -114,10 +114,9 @@ def l1_angles(
 def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
     """Return the cross-track integrator of L1 (`_L1_xtrack_i` of AP_L1_Control) after one more tick, rad.
 
-    It integrates the angle between the leg and the direction to the L1 point.
-
-    aim_angle: angle between the leg and the direction to the L1 point, rad, NaN while L1 aims at a waypoint.  The
-        integrator changes only while the magnitude of this angle is below 5 degrees.
+    aim_angle: integrated angle, between the leg and the direction to the L1 point, rad; NaN while L1 aims at a
+        waypoint. The integrator changes only while the magnitude of this angle is below 5 degrees.
+    integrator: value before this tick, rad.
     gain: NAVL1_XTRACK_I.
     """
     if math.isnan(aim_angle) or abs(aim_angle) >= _INTEGRATION_LIMIT_RAD:

@@ -75,9 +75,9 @@ _FIXED_GAINS = {
 
 
 def gains_at_airspeed(airspeed: float) -> dict[str, float]:
-    """Return `TYPICAL_GAINS` scaled from 25 m/s to another airspeed (m/s).
+    """Return `TYPICAL_GAINS` scaled from 25 m/s to another airspeed (m/s), by name.
 
-    The gains of control surfaces are not changed here, because they are scaled with airspeed elsewhere.
+    The gains of control surfaces are not changed here: the inner loops scale them with dynamic pressure in flight.
     """
     ratio = airspeed / 25.0
     gains: dict[str, float] = {}
@@ -88,7 +88,7 @@ def gains_at_airspeed(airspeed: float) -> dict[str, float]:
 
 
 def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
-    """Compute the gains that follow from the airframe's linear model in level cruise.
+    """Compute the gains that follow from the airframe's linear model in level cruise, by name.
 
     fdm: the aircraft in JSBSim; None to load it.
 
@@ -108,7 +108,10 @@ def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
 
 
 def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
-    """Return the gains of an airframe from the matrices A and B of `flight.dynamics.trim.linearise`."""
+    """Return the gains that depend on the airframe, by name.
+
+    a, b: matrices A and B of `flight.dynamics.trim.linearise`.
+    """
     speed = aircraft.airspeed
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)

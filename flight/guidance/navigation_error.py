@@ -22,8 +22,8 @@ _MOTION_FIELDS = field_names(MOTION)
 NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float64, (3,)))
 
 
-def start_navigation(noise: Floats, lags: Record) -> None:
-    """Initialise the navigation error so that its statistics are the same throughout the flight.
+def start_navigation_error(noise: Floats, lags: Record) -> None:
+    """Initialise the navigation error, so that its statistics do not change during the flight.
 
     noise: random numbers from the standard normal distribution, (6,).
     lags: a record of `NAVIGATION_LAGS`, which is set.

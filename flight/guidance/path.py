@@ -58,6 +58,9 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
     The distance is measured along the piece, m; it may be negative (before the start) or exceed the length of the
     piece. The cross-track error is in m, positive to the right. The course is the path's course at the projected point,
     rad.
+
+    piece: a record of `PIECE`.
+    east, north: position to project, m.
     """
     course, curvature = piece.course, piece.curvature
     offset_east, offset_north = east - piece.east, north - piece.north
@@ -84,7 +87,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 @inner
 def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
-    """Find the position along the path, store it in ``memory``, and return the course of the path there, rad.
+    """Find the aircraft's position along the path, store it in ``memory``, and return the path's course there, rad.
 
     The search starts at the piece of the last tick and never goes back.
 
@@ -107,7 +110,7 @@ def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
 
 
 @inner
-def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
+def pass_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
     """Advance the position in ``memory`` past sharp corners, to the leg that an autopilot already flies.
 
     An autopilot may turn to a leg before it passes the end of the previous leg.
@@ -315,7 +318,9 @@ def _ground_following_corners(
     value at the start of the leg to the value that the mission item at the end states. Places where the terrain is
     unknown have no corner.
 
+    leg: index of the leg.
     segment_start: east and north of the start of the leg's straight part, m, (2,).
+    course: course of the leg, rad.
     start_distance: distance of the straight part's start along the path, m.
     length: length of the straight part, m.
     """
@@ -397,11 +402,14 @@ def _fly_over_arcs(
 ) -> list[tuple[Floats, float, float, float]]:
     """Return the three arcs of a fly-over turn: start, course at the start, curvature and length of each.
 
-    The start is (2,), m; the course is in rad, the curvature in 1/m, the length in m.  Two arcs turn past the course of
-    the next leg, and the third leads back onto that leg.  The first turn is divided because `project` is ambiguous for
-    larger angles.
+    The start is (2,), m; the course is in rad, the curvature in 1/m, the length in m. The first two arcs turn past the
+    course of the next leg, and the third leads back onto that leg. The turn past that course is split into two arcs
+    because `project` is ambiguous for larger angles.
 
-    turn: rad, positive to the right.
+    corner: position of the waypoint, (2,) m.
+    course: course of the leg to the waypoint, rad.
+    turn: course change at the waypoint, rad, positive to the right.
+    radius: radius of the arcs, m.
     """
     turn_sign, overshoot = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
     half_angle = 0.5 * (abs(turn) + overshoot)
@@ -504,7 +512,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
                 waypoints["exit_bearing"][is_loiter] = bearing % (2.0 * math.pi) or 2.0 * math.pi
         waypoints["turn"][last_before_return] = turn
     if mission is not None:
-        # The waypoint before a landing, and those of a landing sequence, as `MissionBase::isLanding` of PX4 defines it.
+        # The waypoint before a landing, and the waypoints of a landing sequence as PX4's `MissionBase::isLanding` says.
         flown_commands = PLACES | TAKEOFFS | LANDINGS
         flown_items = [item for item in mission.items if item.command in flown_commands and item.has_position]
         last_items = [item.seq for item, next_item in pairwise(flown_items) if next_item.command in LANDINGS]
@@ -577,13 +585,13 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     return points, (pieces["leg"] + (midpoints > pieces["leg_change"])).astype(np.int64)
 
 
-def arc_point(piece: Record, distance_along: float) -> tuple[float, float]:
+def point_on_piece(piece: Record, distance_along: float) -> tuple[float, float]:
     """Return east and north (m) on a piece, ``distance_along`` m from its start.
 
     piece: a record of `flight.guidance.path.PIECE`.
 
     >>> quarter = np.array([(0.0, 157.0, 0.0, 0.0, 0.0, 0.01, 0, math.inf)], PIECE)[0]
-    >>> east, north = arc_point(quarter, 50.0 * math.pi)
+    >>> east, north = point_on_piece(quarter, 50.0 * math.pi)
     >>> round(float(east), 6), round(float(north), 6)
     (100.0, 100.0)
     """

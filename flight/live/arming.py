@@ -81,6 +81,7 @@ class ArmingState:
     def arm(self, should_arm: bool, param2: float) -> CommandResult:
         """Arm or disarm the vehicle (MAV_CMD_COMPONENT_ARM_DISARM), or refuse the command.
 
+        should_arm: True to arm, False to disarm.
         param2: second parameter of the command; the values in `_FORCE_VALUES` force the command.
 
         The result is IN_PROGRESS while the verdict on the mission is awaited; the command must then be repeated.
@@ -129,7 +130,7 @@ class ArmingState:
         return CommandResult(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
 
     def start_mission(self) -> CommandResult:
-        """Start the mission (MAV_CMD_MISSION_START)."""
+        """Start the mission (MAV_CMD_MISSION_START) by a change to AUTO; denied if the vehicle is not armed."""
         if not self.armed:
             return CommandResult(DENIED, "start denied: not armed")
         return self.set_mode(AUTO)
@@ -141,7 +142,7 @@ class ArmingState:
         return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
     def go_to(self, center: LoiterCenter) -> CommandResult:
-        """Request a flight to a loiter, in mode GUIDED; denied on the ground."""
+        """Request a flight in mode GUIDED to a loiter around a center; denied on the ground."""
         if not self.flying:
             return CommandResult(DENIED, "go-to denied: not in flight")
         self.mode, self.loiter_center = GUIDED, center
@@ -173,7 +174,7 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def on_mission_uploaded(self) -> None:
-        """Set the state for an uploaded mission whose verdict is awaited."""
+        """Record that a mission was uploaded whose verdict is awaited."""
         self.is_judging, self.mission_state = True, NOT_STARTED
 
     def on_mission_judged(self, verdict: MissionJudged) -> str:
@@ -197,11 +198,14 @@ class ArmingState:
             self.mode = MANUAL
 
     def on_flight_started(self) -> None:
-        """Set the state of a started flight."""
+        """Record that the flight has started."""
         self.flying, self.mission_state = True, ACTIVE
 
     def on_flight_ended(self, is_completed: bool) -> None:
-        """Disarm the vehicle after its flight, ready to fly again."""
+        """Disarm the vehicle after its flight, ready to fly again.
+
+        is_completed: True if the route was flown to its end; in AUTO the mission is then complete.
+        """
         self.flying = self.armed = self.end_requested = False
         self.mission_state = COMPLETE if is_completed and self.mode == AUTO else NOT_STARTED
         self.mode, self.loiter_center = MANUAL, None

@@ -42,7 +42,7 @@ from world.errors import PlanflyError
 
 # Rate of the snapshots, 1/s.
 SNAPSHOT_RATE_HZ = 60.0
-# Interval at which the log is passed to the operating system, s.
+# Interval at which the log is flushed, s.
 FLUSH_PERIOD_S = 0.2
 # Maximum delay of the flight behind the clock that is made up, s; a longer delay remains.
 _MAX_DELAY_S = 0.5
@@ -184,10 +184,10 @@ Event = ProcessReady | MissionJudged | FlightDiverted | FlightEnded | FlightJudg
 
 
 class LogSink(Protocol):
-    """Recorder of a flight."""
+    """Interface of a flight's log, which stores the rows and finally the verdict."""
 
     def write(self, block: Track) -> None:
-        """Append rows and hand them to the operating system."""
+        """Append rows, and flush them."""
 
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
@@ -274,7 +274,7 @@ def send_event(connection: Connection, event: Event) -> None:
 
 
 def read_event(data: bytes) -> Snapshot | Event:
-    """Read an event from the flight process."""
+    """Return the event or the snapshot in bytes that the flight process has sent."""
     if data[:1] == _PACKED_MARK:
         return Snapshot.unpack(data[1:])
     return pickle.loads(data[1:])
@@ -295,7 +295,10 @@ class _RequestQueue:
         return self._queued.popleft() if self._queued else self._connection.recv()
 
     def poll(self) -> object:
-        """Return the next request, or None without one; EndFlight(quit=True) if the link has closed."""
+        """Return the next request without waiting; None if there is none.
+
+        A closed link is returned as a request to end the process.
+        """
         if not self._queued and not self._connection.poll():
             return None
         try:
@@ -432,7 +435,7 @@ class _LoggedFlight:
             log.abandon()
 
     def _write(self) -> None:
-        """Write the rows since the last call to the current log, and hand them to the operating system."""
+        """Write the rows since the last call to the current log, which flushes them."""
         self._logs[-1].write(as_track(join_rows(self._unwritten_rows)))
         self._unwritten_rows.clear()
 

@@ -1,8 +1,8 @@
 """Serve the vehicle's stations on one UDP socket.
 
-A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or, on this machine, any message addressed
-to the vehicle, from an address that is allowed, and signed if a key is set. The table of stations is bounded; a silent
-station is removed from it.
+A station gets more than heartbeats only after it has sent a valid HEARTBEAT or, on this machine, any message addressed
+to the vehicle. The message must come from an allowed address, and be signed if a key is set. The table of stations is
+bounded; a silent station is removed from it.
 """
 
 import hashlib
@@ -309,7 +309,7 @@ class Peer:
 
     @property
     def station(self) -> Station:
-        """Station that sent the message, for the mission protocol."""
+        """Station of the mission protocol that sends from this address."""
         return Station(self.address, self.system, self.component)
 
 
@@ -499,7 +499,11 @@ class Link:
         return messages
 
     def _notice_once(self, host: str, named_hosts: set[str], text: str) -> None:
-        """Add a notice about an address, unless the address is in ``named_hosts``, which receives it."""
+        """Add a notice about an address, only once for each address.
+
+        named_hosts: addresses with a notice, to which the address is added. No notice is added if there are already
+            `_MAX_NAMED_STRANGERS` of them.
+        """
         if host not in named_hosts and len(named_hosts) < _MAX_NAMED_STRANGERS:
             named_hosts.add(host)
             self._notices.append(f"{host} {text}")

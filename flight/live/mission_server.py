@@ -65,6 +65,7 @@ def to_message(
 ) -> Any:
     """Convert an item to a MISSION_ITEM_INT message; latitude and longitude are rounded to 1e-7 degrees.
 
+    target_system, target_component: MAVLink ids of the receiver.
     current: True for the item that is flown now.
     seq: number of the item in the message; None for the item's own number.
     mission_type: list that the item belongs to; None to judge it by the item's command.
@@ -350,7 +351,7 @@ class MissionServer:
                 if finished.station == station:
                     finished.remaining_count = 0
         try:
-            kind = MissionType(getattr(message, "mission_type", 0))
+            mission_type = MissionType(getattr(message, "mission_type", 0))
         except ValueError:
             if message.get_type() == "MISSION_CLEAR_ALL" and message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
                 return self._clear_lists(station, tuple(MissionType), mavlink.MAV_MISSION_TYPE_ALL, now)
@@ -358,7 +359,7 @@ class MissionServer:
                 return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, int(message.mission_type))]
             return []
         handler = _HANDLERS.get(message.get_type())
-        return handler(self, message, station, kind, now) if handler else []
+        return handler(self, message, station, mission_type, now) if handler else []
 
     def tick(self, now: float) -> list[MissionReply]:
         """Return the messages that are due: repeated requests for items, and the end of abandoned uploads.
@@ -366,77 +367,84 @@ class MissionServer:
         now: time of the clock that `handle` uses, s.
         """
         replies = []
-        for kind, upload in list(self._uploads.items()):
+        for mission_type, upload in list(self._uploads.items()):
             if now - upload.last_message_time > UPLOAD_TIMEOUT_S:
-                del self._uploads[kind]
-                text = f"{_TITLES[kind]} upload abandoned after item {len(upload.items)} of {upload.count}; no change"
-                replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, text))
+                del self._uploads[mission_type]
+                title, received_count = _TITLES[mission_type], len(upload.items)
+                text = f"{title} upload abandoned after item {received_count} of {upload.count}; no change"
+                replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, mission_type, text))
             elif now - upload.last_request_time >= upload.wait:
                 upload.wait = min(2.0 * upload.wait, MAX_RETRY_PERIOD_S)
                 upload.was_repeated = True
                 upload.unanswered_count += not upload.items
-                replies.append(self._request_next_item(upload, kind, now))
-        for kind, finished in self._finished.items():
+                replies.append(self._request_next_item(upload, mission_type, now))
+        for mission_type, finished in self._finished.items():
             if finished.remaining_count > 0 and now - finished.last_request_time >= CONFIRMATION_PERIOD_S:
                 finished.remaining_count -= 1
                 finished.last_request_time = now
-                replies.append(_item_request(finished.station, finished.count - 1, kind))
+                replies.append(_item_request(finished.station, finished.count - 1, mission_type))
         return replies
 
-    def _start_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _start_upload(
+        self, message: Any, station: Station, mission_type: MissionType, now: float
+    ) -> list[MissionReply]:
         """Start an upload and request its first item (MISSION_COUNT); a count of 0 clears the list."""
         count = int(message.count)
-        refusal = self._upload_refusal(station, kind, now)
+        refusal = self._upload_refusal(station, mission_type, now)
         if refusal:
-            return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
+            return [self._ack(station, mavlink.MAV_MISSION_DENIED, mission_type, refusal)]
         if count > MAX_UPLOADED_ITEMS:
             text = f"{count} items: at most {MAX_UPLOADED_ITEMS} are stored"
-            return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, text)]
+            return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, mission_type, text)]
         # The uploads of other, silent stations are dropped.
-        self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
+        self._uploads = {
+            mission_type: upload for mission_type, upload in self._uploads.items() if upload.station == station
+        }
         if count == 0:
-            return self._clear_lists(station, (kind,), kind, now)
+            return self._clear_lists(station, (mission_type,), mission_type, now)
         # MISSION_COUNT always begins a new upload: a station that starts over with the same count must not have its
         # items mixed.
-        upload = self._uploads[kind] = _Upload(station, count, now, now, now)
-        self._finished.pop(kind, None)
-        return [self._request_next_item(upload, kind, now)]
+        upload = self._uploads[mission_type] = _Upload(station, count, now, now, now)
+        self._finished.pop(mission_type, None)
+        return [self._request_next_item(upload, mission_type, now)]
 
-    def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _receive_item(
+        self, message: Any, station: Station, mission_type: MissionType, now: float
+    ) -> list[MissionReply]:
         """Store an item of an upload; request the next item, or replace the list after the last item.
 
         message: MISSION_ITEM_INT or MISSION_ITEM.
-        kind: list to which the item belongs.
+        mission_type: list to which the item belongs.
 
         Without an upload, an item is a command to fly to its position, or a repeated last item, which is acknowledged
         again.
         """
-        upload = self._uploads.get(kind)
+        upload = self._uploads.get(mission_type)
         if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
             # Fly to the position or altitude of an item that a station sends outside an upload.
             try:
                 item = from_message(message, "go-to")
             except MissionError as error:
-                return [self._ack(station, mavlink.MAV_MISSION_INVALID, kind, str(error))]
+                return [self._ack(station, mavlink.MAV_MISSION_INVALID, mission_type, str(error))]
             if message.current != _GO_TO_POSITION:
                 item = replace(item, lat_deg=math.nan, lon_deg=math.nan)
             problem = self.go_to(item)
             result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
-            return [self._ack(station, result, kind, problem)]
+            return [self._ack(station, result, mission_type, problem)]
         if upload is None or upload.station != station:
-            finished = self._finished.get(kind)
+            finished = self._finished.get(mission_type)
             is_last_item = finished is not None and (finished.station, finished.count) == (station, message.seq + 1)
             if finished is not None and is_last_item and now - finished.last_ack_time >= DUPLICATE_ITEM_TIME_S:
                 # The station repeats its last item, because the ACK was lost.
                 finished.last_ack_time = now
-                return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
+                return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, mission_type)]
             return []
         upload.last_message_time = now
         if message.seq != len(upload.items):
             # A duplicate, or an item out of order; the missing one is requested again in time.
             return []
         try:
-            item = from_message(message, _TITLES[kind])
+            item = from_message(message, _TITLES[mission_type])
         except MissionError as error:
             # The result names an invalid latitude, an invalid longitude, or any other fault.
             degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
@@ -445,122 +453,142 @@ class MissionServer:
                 result = mavlink.MAV_MISSION_INVALID_PARAM5_X
             elif abs(message.y) > 180.0 * degree_scale:
                 result = mavlink.MAV_MISSION_INVALID_PARAM6_Y
-            return [self._reject_upload(upload, kind, int(result), str(error))]
+            return [self._reject_upload(upload, mission_type, int(result), str(error))]
         is_allowed = (
-            item.command in _ALLOWED_COMMANDS[kind]
-            if kind in _ALLOWED_COMMANDS
+            item.command in _ALLOWED_COMMANDS[mission_type]
+            if mission_type in _ALLOWED_COMMANDS
             else item.command not in _ALLOWED_COMMANDS[MissionType.FENCE]
         )
         placement_problem = (
-            "" if is_allowed else f"{_TITLES[kind]}: item {item.seq}: command {item.command} does not belong there"
+            ""
+            if is_allowed
+            else f"{_TITLES[mission_type]}: item {item.seq}: command {item.command} does not belong there"
         )
         if placement_problem:
-            return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
+            return [self._reject_upload(upload, mission_type, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
         upload.items.append(item)
         upload.has_floats = message.get_type() == "MISSION_ITEM"
         upload.wait = min(max(MIN_RETRY_PERIOD_S, 1.5 * (now - upload.first_request_time)), MAX_RETRY_PERIOD_S)
         upload.first_request_time = now
         if len(upload.items) < upload.count:
-            return [self._request_next_item(upload, kind, now)]
-        del self._uploads[kind]
-        self.lists[kind] = tuple(upload.items)
-        self.changed.add(kind)
-        self._finished[kind] = _FinishedUpload(
+            return [self._request_next_item(upload, mission_type, now)]
+        del self._uploads[mission_type]
+        self.lists[mission_type] = tuple(upload.items)
+        self.changed.add(mission_type)
+        self._finished[mission_type] = _FinishedUpload(
             station, upload.count, now, now, CONFIRMATION_COUNT if upload.was_repeated else 0
         )
         is_float = message.get_type() == "MISSION_ITEM"
-        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, mission_type, _FLOAT_WARNING if is_float else "")]
 
-    def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
-        """Answer MISSION_REQUEST_LIST with the number of items of a list."""
-        count = len(self.lists[kind])
+    def _item_count_reply(
+        self, _message: Any, station: Station, mission_type: MissionType, _now: float
+    ) -> list[MissionReply]:
+        """Return the number of items of a list, the answer to MISSION_REQUEST_LIST."""
+        count = len(self.lists[mission_type])
         return [
             MissionReply(
-                station, mavlink.MAVLink_mission_count_message(station.system, station.component, count, int(kind))
+                station,
+                mavlink.MAVLink_mission_count_message(station.system, station.component, count, int(mission_type)),
             )
         ]
 
-    def _send_item(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
-        """Answer MISSION_REQUEST_INT or MISSION_REQUEST with an item of a list."""
-        items = self.lists[kind]
+    def _item_reply(self, message: Any, station: Station, mission_type: MissionType, _now: float) -> list[MissionReply]:
+        """Return an item of a list, the answer to MISSION_REQUEST_INT or MISSION_REQUEST."""
+        items = self.lists[mission_type]
         if not message.seq < len(items):
-            return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
+            return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, mission_type)]
         item = to_message(
             items[message.seq],
             target_system=station.system,
             target_component=station.component,
             seq=message.seq,
-            mission_type=kind,
+            mission_type=mission_type,
         )
         return [MissionReply(station, item)]
 
     def _clear_lists(
-        self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
+        self, station: Station, mission_types: tuple[MissionType, ...], acknowledged_type: int, now: float
     ) -> list[MissionReply]:
         """Clear lists and acknowledge it; clear no list if one of them must not change now.
 
         acknowledged_type: MAV_MISSION_TYPE that the acknowledgement states.
         """
-        for kind in kinds:
-            refusal = self._upload_refusal(station, kind, now)
+        for mission_type in mission_types:
+            refusal = self._upload_refusal(station, mission_type, now)
             if refusal:
                 return [self._ack(station, mavlink.MAV_MISSION_DENIED, acknowledged_type, refusal)]
-        for kind in kinds:
-            self._uploads.pop(kind, None)
-            self._finished.pop(kind, None)
-            if self.lists[kind]:
-                self.lists[kind] = ()
-                self.changed.add(kind)
+        for mission_type in mission_types:
+            self._uploads.pop(mission_type, None)
+            self._finished.pop(mission_type, None)
+            if self.lists[mission_type]:
+                self.lists[mission_type] = ()
+                self.changed.add(mission_type)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, acknowledged_type)]
 
-    def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _cancel_upload(
+        self, message: Any, station: Station, mission_type: MissionType, now: float
+    ) -> list[MissionReply]:
         """Discard the upload of a station that cancels it (MISSION_ACK with an error).
 
         After some unanswered requests the vehicle sends MISSION_REQUEST instead of MISSION_REQUEST_INT. A station that
-        refuses the former as unsupported gets the latter again.
+        refuses MISSION_REQUEST as unsupported gets MISSION_REQUEST_INT again.
         """
-        upload = self._uploads.get(kind)
+        upload = self._uploads.get(mission_type)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
             return []
         if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.unanswered_count >= _INT_REQUEST_ATTEMPTS:
             # The station accepts only MISSION_REQUEST_INT, and did not receive the earlier requests.
             upload.unanswered_count = 0
-            return [self._request_next_item(upload, kind, now)]
-        del self._uploads[kind]
+            return [self._request_next_item(upload, mission_type, now)]
+        del self._uploads[mission_type]
         return []
 
-    def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
-        """Return the reason why a station must not change a list now, or ""."""
-        if self.locked and kind == MissionType.MISSION:
+    def _upload_refusal(self, station: Station, mission_type: MissionType, now: float) -> str:
+        """Return the reason why a station must not change a list now, or "" if it may."""
+        if self.locked and mission_type == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
             if upload.station != station and now - upload.last_message_time <= LOCK_TIMEOUT_S:
                 return f"another station (system {upload.station.system}) is uploading"
         return ""
 
-    def _request_next_item(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
+    def _request_next_item(self, upload: _Upload, mission_type: MissionType, now: float) -> MissionReply:
         """Return the request for the next item of an upload."""
         upload.last_request_time = now
         if upload.unanswered_count >= _INT_REQUEST_ATTEMPTS or upload.has_floats:
-            return _item_request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
-        return _item_request(upload.station, len(upload.items), kind)
+            return _item_request(
+                upload.station, len(upload.items), mission_type, mavlink.MAVLink_mission_request_message
+            )
+        return _item_request(upload.station, len(upload.items), mission_type)
 
-    def _reject_upload(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
-        """Discard an upload, and return the ACK with the reason."""
-        del self._uploads[kind]
-        return self._ack(upload.station, result, kind, f"{text}; nothing changed")
+    def _reject_upload(self, upload: _Upload, mission_type: MissionType, result: int, text: str) -> MissionReply:
+        """Discard an upload, and return the ACK with a MAV_MISSION_RESULT and the reason."""
+        del self._uploads[mission_type]
+        return self._ack(upload.station, result, mission_type, f"{text}; nothing changed")
 
-    def _ack(self, station: Station, result: int, kind: int, text: str = "") -> MissionReply:
-        """Return a MISSION_ACK for a station, with a text for all stations."""
-        message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(kind))
+    def _ack(self, station: Station, result: int, mission_type: int, text: str = "") -> MissionReply:
+        """Return a MISSION_ACK for a station, with a text for all stations.
+
+        result: MAV_MISSION_RESULT.
+        mission_type: MAV_MISSION_TYPE that the message states.
+        """
+        message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(mission_type))
         return MissionReply(station, message, text)
 
 
 def _item_request(
-    station: Station, seq: int, kind: MissionType, message_class: Any = mavlink.MAVLink_mission_request_int_message
+    station: Station,
+    seq: int,
+    mission_type: MissionType,
+    message_class: Any = mavlink.MAVLink_mission_request_int_message,
 ) -> MissionReply:
-    """Return the request for an item of an upload."""
-    return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
+    """Return the request for an item of an upload.
+
+    seq: number of the item.
+    message_class: class of the request, MISSION_REQUEST_INT or MISSION_REQUEST.
+    """
+    return MissionReply(station, message_class(station.system, station.component, seq, int(mission_type)))
 
 
 _ITEM_MESSAGES = ("MISSION_ITEM_INT", "MISSION_ITEM")
@@ -568,9 +596,11 @@ _HANDLERS = {
     "MISSION_COUNT": MissionServer._start_upload,
     "MISSION_ITEM_INT": MissionServer._receive_item,
     "MISSION_ITEM": MissionServer._receive_item,
-    "MISSION_REQUEST_LIST": MissionServer._send_count,
-    "MISSION_REQUEST_INT": MissionServer._send_item,
-    "MISSION_REQUEST": MissionServer._send_item,
-    "MISSION_CLEAR_ALL": lambda server, _message, station, kind, now: server._clear_lists(station, (kind,), kind, now),
+    "MISSION_REQUEST_LIST": MissionServer._item_count_reply,
+    "MISSION_REQUEST_INT": MissionServer._item_reply,
+    "MISSION_REQUEST": MissionServer._item_reply,
+    "MISSION_CLEAR_ALL": lambda server, _message, station, mission_type, now: server._clear_lists(
+        station, (mission_type,), mission_type, now
+    ),
     "MISSION_ACK": MissionServer._cancel_upload,
 }

@@ -54,7 +54,7 @@ class Parameter:
 
 
 def _empty_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
-    """Return no parameters."""
+    """Return no parameters; stands for the parameters of a vehicle without a simulated autopilot."""
     return {}
 
 
@@ -164,7 +164,8 @@ def vehicle_parameters(
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
-    autopilot_values: function as in `Parameters`; its names replace the vehicle's own.
+    autopilot_values: function that returns the simulated autopilot's parameters by name, from the values that stations
+        have set. They replace parameters of the vehicle with the same name.
     not_simulated: parameters that are read but not simulated; they cannot be set.
 
     >>> parameters = vehicle_parameters(
@@ -312,7 +313,7 @@ class Requests:
                 return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
         return []
 
-    def on_verdict(self) -> list[Response]:
+    def answer_waiting_arm_commands(self) -> list[Response]:
         """Return the responses to arm commands that have waited for the verdict."""
         waiting_commands, self._waiting_commands = self._waiting_commands, []
         replies: list[Response] = []
@@ -361,7 +362,11 @@ class Requests:
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
     ) -> tuple[CommandResult, list[Any]]:
-        """Send a message once, or set or get its interval, as a command asks; return the result and the messages."""
+        """Send a message once, or set or get its interval; return the result and the messages to send.
+
+        number: MAV_CMD of the command.
+        message: COMMAND_LONG or COMMAND_INT that carries the command.
+        """
         implied_number = _MESSAGE_COMMANDS[number]
         requested_number = _to_integer(message.param1) if implied_number is None else implied_number
         message_class = mavlink.mavlink_map.get(requested_number)
@@ -389,7 +394,12 @@ class Requests:
 
     @staticmethod
     def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
-        """Return the COMMAND_ACK for a station, and the text of the reply, if any."""
+        """Return the COMMAND_ACK for a station, and the text of the reply, if any.
+
+        system, component: MAVLink ids of the station.
+        number: MAV_CMD of the acknowledged command.
+        reply: result of the command and its text.
+        """
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
         replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:

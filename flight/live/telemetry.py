@@ -183,6 +183,7 @@ class StatusText(NamedTuple):
 def status_texts(text: str, severity: int, number: int) -> list[Any]:
     """Return the STATUSTEXT messages of a text, in pieces of 50 bytes that stations join again.
 
+    severity: MAV_SEVERITY.
     number: 1..65535, new for each text.
 
     Ground stations show ASCII: a degree sign becomes " deg", and any other character "?". Bytes beyond 400 are omitted.

@@ -71,10 +71,12 @@ class Downlink:
     """Sender of messages to every station that has sent a heartbeat.
 
     show: function that shows each text at the terminal.
-    pause: maximum time between two calls of `tick`, s, which bounds the number of parameters sent at once.
+    max_tick_interval: maximum time between two calls of `tick`, s, which bounds the number of parameters sent at once.
     """
 
-    def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
+    def __init__(
+        self, link: Link, status: Status, parameters: Parameters, show: ShowText, max_tick_interval: float
+    ) -> None:
         """Make the first heartbeat due at once.
 
         status: state of the vehicle, which telemetry reports.
@@ -83,7 +85,7 @@ class Downlink:
         self._status = status
         self._parameters = parameters
         self._show = show
-        self._pause = pause
+        self._max_tick_interval = max_tick_interval
         self._text_count = 0
         self._next_heartbeat = link.clock()
 
@@ -136,7 +138,7 @@ class Downlink:
             # Send the next parameters to a station that requested all of them.
             if peer.next_parameter is not None:
                 first_number, entries = int(peer.next_parameter), self._parameters.entries
-                peer.next_parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
+                peer.next_parameter += max(1.0, PARAMETERS_PER_SECOND * self._max_tick_interval)
                 for number in range(first_number, min(int(peer.next_parameter), len(entries))):
                     self._link.send(self._parameters.message(number), peer)
                 if peer.next_parameter >= len(entries):
@@ -202,14 +204,14 @@ class MissionProgress:
             self._report_reached(waypoint)
         self._leg = leg
         self._status.current = self._station_number(leg + 1)
-        self.send_current()
+        self.send_mission_current()
 
     def report_completion(self) -> None:
         """Report the last waypoint as reached."""
         self._report_reached(len(self._waypoint_items()) - 1)
 
-    def send_current(self) -> None:
-        """Send the current item."""
+    def send_mission_current(self) -> None:
+        """Send MISSION_CURRENT, the number of the current item, to all stations."""
         message: Any = telemetry_message("MISSION_CURRENT", self._status)
         self._downlink.send_to_all(message)
 
@@ -324,7 +326,7 @@ class Vehicle:
                 self.server.changed.add(kind)
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Serve until ``stop`` returns True, then end the flight and its process."""
+        """Serve stations until ``stop`` returns True; `close` then ends the flight and its process."""
         while not stop():
             self.step(_MAX_WAIT_S)
 
@@ -407,7 +409,7 @@ class Vehicle:
             self.downlink.send_text(text, WARNING)
 
     def _apply_state(self) -> None:
-        """Carry out what the arming state requests: end, divert or start the flight."""
+        """Act on the requests in the arming state: end, divert or start the flight."""
         if self.arming.end_requested:
             self.arming.end_requested = False
             self._send_request(EndFlight())
@@ -440,7 +442,7 @@ class Vehicle:
         if not self.server.lists[MissionType.MISSION]:
             self.arming.on_mission_cleared()
             self.status.snapshot, self.status.home = self._standby
-            self._send_responses(self.requests.on_verdict())
+            self._send_responses(self.requests.answer_waiting_arm_commands())
             self._refresh_status()
             return
         if self.server.lists[MissionType.MISSION] is not self._start_item_upload:
@@ -548,7 +550,7 @@ class Vehicle:
         if verdict.start is not None and verdict.home is not None:
             self.status.snapshot, self.status.home = verdict.start, verdict.home
         self._progress.reset_current_item()
-        self._send_responses(self.requests.on_verdict())
+        self._send_responses(self.requests.answer_waiting_arm_commands())
         self._apply_state()
 
     def _handle_flight_end(self, end_reason: str) -> None:
@@ -559,7 +561,7 @@ class Vehicle:
         self.arming.on_flight_ended(is_completed)
         self._refresh_status()
         self.downlink.send_text(f"flight {end_reason}; disarmed", INFO if is_completed else CRITICAL)
-        self._progress.send_current()
+        self._progress.send_mission_current()
         if self._progress.first:
             # The next flight flies the whole mission again.
             self._progress.first = 0

@@ -318,7 +318,7 @@ SUPPORT: dict[Command, Support] = {
     C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "releases the parachute, or allows its release"),
     C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane continues in inverted flight"),
     C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "for the payload; its mass is not simulated"),
-    # `Plane::autotune_enable`: the roll and pitch gains change in flight.  PX4 1.16 refuses it.
+    # `Plane::autotune_enable`: the roll and pitch gains change in flight. PX4 1.16 refuses it.
     C.DO_AUTOTUNE_ENABLE: Support(
         _OPEN, _OPEN, "the autopilot changes its own gains in flight; PX4 accepts it from 1.17 on"
     ),

@@ -57,7 +57,7 @@ def movable_item(mission: Mission, index: int) -> MissionItem:
 
 
 def move_item(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Mission:
-    """Return the mission with an item moved, at the same altitude in the item's frame.
+    """Return the mission with an item moved to a latitude and longitude (degrees), at the same altitude in its frame.
 
     >>> items = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> move_item(Mission(None, items), 1, 46.01, 8.00000004).items[1].lon_deg

@@ -253,9 +253,11 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
 def _omit_crossed_exclusions(
     zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest
 ) -> tuple[list[Zone], list[str]]:
-    """Split zones into those to write to the fence and the names of exclusions that the mission crosses on the map.
+    """Return the zones to write to the fence, and the names of the exclusions to omit.
 
-    passes: test whether the mission passes through a fence shape, at any altitude.
+    An exclusion is omitted if the mission crosses it on the map.
+
+    passes: function that returns True if the mission passes through a fence shape, at any altitude.
     """
     remaining, crossed_names = [], []
     for zone in zones:

@@ -115,6 +115,7 @@ class _ItemBuilder:
     def add(self, command: Command, params: tuple[float, float, float, float], position: Floats | None = None) -> None:
         """Append a mission item; its altitude is AMSL.
 
+        params: the first four parameters of the command.
         position: east, north, up on the map, (3,) m; None for a command without a position.
         """
         frame = Frame.MISSION

@@ -54,7 +54,7 @@ class TakeOff:
     speed: float
     acceleration: float
 
-    def release(self) -> tuple[Floats, Floats]:
+    def release_state(self) -> tuple[Floats, Floats]:
         """Return the position (m) and the velocity (m/s) at the end of the launch, each (3,) east, north, up.
 
         The release is the end of the rail, the throw of a hand launch, or the start of a runway. On a runway the
@@ -231,6 +231,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
     """Return the part of a route between take-off and landing, which the rules for flight in the air judge.
 
+    ground_phases: take-off and landing that are simulated.
     first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
 
     The waypoints before the end of the take-off are moved to the start of the first leg, 1 m apart. The leg to the

@@ -30,7 +30,7 @@ class Notes:
     _items: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, text: str, seq: int | None = None) -> None:
-        """Add a note on an item or on the whole mission; a note that exists already is ignored."""
+        """Add a note on an item, by its number, or on the whole mission; ignore a note that exists already."""
         items = self._items.setdefault(text, [])
         if seq is not None and seq not in items[-1:]:
             items.append(seq)

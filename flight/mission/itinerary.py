@@ -1,8 +1,8 @@
 """List a mission's stops in flying order, with jumps unrolled and a speed for each leg.
 
-ArduPlane and PX4 reach the same stops in the same order, but run the commands between them at different times. PX4
-runs each command at its position in the list (`MissionBase::advance_mission`). ArduPlane runs the first command before
-the leg to the next stop, and the others one after another on that leg, following jumps according to the state of their
+ArduPlane and PX4 reach the same stops in the same order, but run the commands between them at different times. PX4 runs
+each command at its position in the list (`MissionBase::advance_mission`). ArduPlane runs the first command before the
+leg to the next stop, and the others one after another on that leg. It follows jumps according to the state of their
 counters at that time (`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): commands after a jump that has
 just been taken for the last time run one loop early (ArduPilot #30376).
 """
@@ -579,8 +579,8 @@ class _ItineraryBuilder:
             elif not self.stops:
                 self.add_open_item("NAV_RETURN_TO_LAUNCH before the start is not flown", target.seq)
             else:
-                # The RTL ends the mission.  The autopilot chooses destination and altitude:
-                # `flight.mission.return_path`.  Earlier speed changes do not apply to the RTL.
+                # The RTL ends the mission. The autopilot chooses destination and altitude:
+                # `flight.mission.return_path`. Earlier speed changes do not apply to the RTL.
                 home = replace(target, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
                 self.stops.append(replace(self._make_stop(home), airspeed=math.nan, px4_airspeed=math.nan))
                 self.has_ended = True

@@ -49,9 +49,9 @@ def item_radius(loiter: Loiter) -> float:
 
 
 def unit_scale(up: float) -> float:
-    """Return the ratio of a loiter's flown radius to its stated radius: 1 at every altitude.
+    """Return 1, the ratio of flown to stated loiter radius for autopilots that fly the same radius at every altitude.
 
-    up: altitude, m AMSL. Some autopilots enlarge their loiters with altitude; this is the function for the others.
+    up: altitude of the loiter, m AMSL; not used.
     """
     return 1.0
 
@@ -64,14 +64,14 @@ class LoiterRules:
     radius_name: name of the parameter of that radius; "" for none.
     radius_of: function that returns the radius that the autopilot reads from a loiter's item, m; 0 for none.
     radius_scale: function that returns the ratio of the flown radius at an altitude (m AMSL) to the stated radius.
-    steers_to_center: True if the autopilot steers to the loiter's center until it reaches the circle, and at the end of
-        the loiter leaves at once for the line from the center; otherwise it joins and leaves the circle on tangents.
+    steers_to_center: True if the autopilot steers to the loiter's center until it reaches the circle, and leaves at
+        once for the line from the center when the loiter ends; False if it joins and leaves the circle on tangents.
     exits_on_heading: True if the autopilot, after steering to the center, counts turns from its turn away from the
         center, and after the end of the loiter continues until it heads for the next waypoint within
         `EXIT_HEADING_TOLERANCE_RAD`.
     holds_height: True if the autopilot holds its altitude on the leg to a loiter to an altitude.
-    max_climb_rate, max_sink_rate: in a loiter, m/s.
-    altitude_tolerance: altitude tolerance, m.
+    max_climb_rate, max_sink_rate: limits in a loiter, m/s.
+    altitude_tolerance: difference from its altitude at which a loiter to an altitude is complete, m.
     ends_in_circle: True if the autopilot loiters indefinitely about a mission's last waypoint.
     unflown_note: note on parts of loiters that are not simulated; "" for none.
     rtl_exit_note: note on the exit from a loiter before an RTL, if the route has another exit.

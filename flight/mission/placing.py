@@ -487,8 +487,8 @@ class _AltitudeConverter:
     def home_amsl(self) -> float:
         """Return home's altitude, m AMSL: as stated, otherwise the ground at home, otherwise 0.
 
-        Heights above home are measured from it.  It is determined only once, with a note if it is not stated, or if it
-        is far from the ground at home.
+        Heights above home are measured from this altitude. It is determined only once, with a note if it is not stated
+        or is far from the ground at home.
         """
         if self._home_amsl is not None:
             return self._home_amsl
@@ -628,7 +628,7 @@ def implied_scenario(
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
     points = project_stops(mission.source, itinerary.stops, origin)
-    # The area, (2, 2) [[west, east], [south, north]].  A return flies to home or a rally point from anywhere on the
+    # The area, (2, 2) [[west, east], [south, north]]. A return flies to home or a rally point from anywhere on the
     # route.
     targets = [(stop.lat_deg, stop.lon_deg) for stop in rally_stops(mission)]
     targets += [] if mission.home is None else [(mission.home.lat_deg, mission.home.lon_deg)]
@@ -721,7 +721,7 @@ def _coverage_error(path: str, raster: RasterFile, lat: Floats, lon: Floats) -> 
 
 
 def _covers_any(raster: RasterFile, lat: Floats, lon: Floats) -> bool:
-    """Return True if a raster covers any of some positions; lat, lon: degrees, (n,)."""
+    """Return True if a raster covers at least one of the positions; lat, lon: degrees, (n,)."""
     (cols, rows), (row_count, col_count) = raster.to_pixels(lon, lat), raster.shape
     # False for a position that the file's coordinate system cannot express (NaN or inf).
     return bool(((cols >= 0.0) & (cols <= col_count - 1.0) & (rows >= 0.0) & (rows <= row_count - 1.0)).any())

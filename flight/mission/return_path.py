@@ -238,7 +238,7 @@ def choose_target(
     position, home_distance = (home.east, home.north, end), _distance(start, home)
     home_target = ReturnTarget(position, "home", "", home_distance, transit_altitude=transit)
     if landing is not None:
-        return _nearest_with_landing(rules, start, home_target, rally, landing)
+        return _nearest_return_target(rules, start, home_target, rally, landing)
     if not rally:
         return home_target
     index = min(range(len(rally)), key=lambda k: _distance(start, rally[k]))
@@ -293,16 +293,20 @@ def _transit_and_end_altitudes(rules: ReturnRules, start: Position, base: float,
     return transit, min(end, transit)
 
 
-def _nearest_with_landing(
+def _nearest_return_target(
     rules: ReturnRules,
     start: Position,
     home_target: ReturnTarget,
     rally: Sequence[ReturnPoint],
     landing: LandingStart,
 ) -> ReturnTarget:
-    """Return the nearest destination: the mission's landing, a rally point or, if the rules include it, home.
+    """Return the nearest destination: the landing, a rally point or, if the rules include it, home.
 
-    The distance to the landing is measured to its landing point (`RTL::findRtlDestination` in PX4's `rtl.cpp`).
+    The distance to the mission's landing is measured to its landing point (`RTL::findRtlDestination` in PX4's
+    `rtl.cpp`).
+
+    start: east, north, up at the start of the RTL, m AMSL.
+    home_target: home as a destination.
     """
     point = ReturnPoint(*(landing.landing or landing.position))
     transit, _ = _transit_and_end_altitudes(rules, start, point.up, 0.0)
@@ -490,7 +494,7 @@ class _ReturnBuilder:
             return course
         radius = self._ability.turn_radius(course, course + math.pi, self._position[2])
         radius *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.initial_climb_bank))
-        arc_to_tangent = self._turn_to_tangent(course, radius)
+        arc_to_tangent = self._arc_to_tangent(course, radius)
         if arc_to_tangent is None:
             return course
         node, full_sweep, tangent = arc_to_tangent
@@ -513,7 +517,7 @@ class _ReturnBuilder:
     def add_turn(self, course: float) -> None:
         """Add the turn to the target, the straight leg to the target, and the loiter there."""
         bearing = _course(self._position, (self._circle.east, self._circle.north, 0.0))
-        arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
+        arc = self._arc_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
         point = self._stop.placed_at(self._position)
         if arc is None:
             # No tangent leads from the turn to the loiter: use a sharp corner.
@@ -570,7 +574,7 @@ class _ReturnBuilder:
         self._add_circle(course, sweep)
 
     def _add_circle(self, course: float, sweep: float) -> None:
-        """Add the part of the loiter from the point with a course (rad) over an angle ``sweep`` around it (rad)."""
+        """Add the part of the loiter that begins at a course and sweeps an angle, both rad."""
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(
             *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.arc_radius)),
@@ -590,13 +594,13 @@ class _ReturnBuilder:
             course += math.copysign(spiral_angle, self._circle.arc_radius)
         self._circle = self._stop.placed_at((next_position[0], next_position[1], self._position[2]))
         radius = self._ability.turn_radius(course, _course(self._position, next_position), self._position[2])
-        arc = self._turn_to_tangent(course, radius)
+        arc = self._arc_to_tangent(course, radius)
         if arc is not None and radius * math.tan(0.5 * min(arc[1], MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
             node, sweep, exit_course = arc
             self._add_arc(node, course, sweep, on_circle=True)
             self._add_waypoint(*point_on_circle(node, exit_course), 0.0, on_circle=True)
 
-    def _turn_to_tangent(self, course: float, radius: float) -> tuple[RoutePoint, float, float] | None:
+    def _arc_to_tangent(self, course: float, radius: float) -> tuple[RoutePoint, float, float] | None:
         """Return the arc from the current position to the tangent that leads to the target's loiter.
 
         course: course at the start of the arc, rad.
@@ -609,18 +613,18 @@ class _ReturnBuilder:
         turn_sign = math.copysign(1.0, course_error)
         arcs = [
             arc
-            for arc in (self._turn_on_side(course, turn_sign * radius), self._turn_on_side(course, -turn_sign * radius))
+            for arc in (self._arc_on_side(course, turn_sign * radius), self._arc_on_side(course, -turn_sign * radius))
             if arc
         ]
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
-    def _turn_on_side(self, course: float, signed_radius: float) -> tuple[RoutePoint, float, float] | None:
+    def _arc_on_side(self, course: float, signed_radius: float) -> tuple[RoutePoint, float, float] | None:
         """Return the arc to the tangent that leads to the target's loiter, for a turn to one side.
 
         course: course at the start of the arc, rad.
         signed_radius: radius of the arc, m, positive for a turn to the right.
 
-        Returns the circle, angle and end course as `_turn_to_tangent` does, or None without a tangent.
+        Returns the circle, angle and end course as `_arc_to_tangent` does, or None without a tangent.
         """
         east, north, up = self._position
         center = (east + signed_radius * math.cos(course), north - signed_radius * math.sin(course), up)

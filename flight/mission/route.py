@@ -455,9 +455,10 @@ def make_route(
         a spiral (5 % if None).
     rules: rules by which the autopilot flies a route.
 
-    The route starts at the first item with a position. With a take-off item it starts above home, at the altitude of
-    that item. Every leg has a horizontal length of at least `flight.mission.placing.SAME_POSITION_DISTANCE_M`. Raises
-    MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two positions.
+    The route starts at the first item with a position, or above home at the altitude of a take-off item if the mission
+    starts with one. Every leg has a horizontal length of at least `flight.mission.placing.SAME_POSITION_DISTANCE_M`.
+    Raises MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two
+    positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -687,7 +688,7 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
 
     PX4 passes a gate when the aircraft crosses the plane through the gate that is perpendicular to the line from the
     gate to the next stop. Each gate is placed where this plane cuts the leg. A gate that is not between two waypoints,
-    and a gate that switches the camera but lies beside its leg, get a note.
+    and a gate that switches the camera but lies next to its leg, get a note.
     """
     placed_stops = list(placed_mission.stops[:1])
     for next_stop in placed_mission.stops[1:]:
@@ -735,7 +736,7 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
 def _read_stops(
     default_airspeed: float, as_px4: bool, stops: Sequence[RoutePoint], first_number: int
 ) -> list[RoutePoint]:
-    """Return placed stops with their numbers, and with the airspeed that the autopilot reads from the mission.
+    """Return placed stops with their numbers in flying order, and with the airspeed of the leg to each.
 
     default_airspeed: airspeed for a stop without a stated one, m/s.
     as_px4: True for the airspeeds as PX4 reads them, False for ArduPlane.
@@ -799,7 +800,7 @@ def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
     """Return a function that computes the steepest climb and descent of a spiral, as tangents.
 
     In wind, the aircraft's slope limit depends on the course. A spiral passes through all courses, so the lowest limit
-    of eight courses counts, or the limit stated for every course if that is lower. The tangent of this limit is
+    of eight courses applies, or the limit stated for every course if that is lower. The tangent of this limit is
     multiplied by `SPIRAL_SLOPE_FRACTION`. The slope is `DEFAULT_SPIRAL_SLOPE` if there is no limit, or if the aircraft
     cannot climb or descend at all.
     """

@@ -147,7 +147,7 @@ class LineAxis:
     """
 
     def __init__(self, corners: Floats) -> None:
-        """Set up the axis of the line through corners (k, 2 or 3) m; k is at least 2."""
+        """Set up the axis of a line from its k corners, (k, 2) or (k, 3) m; k is at least 2."""
         self.corners = corners
         leg_vectors = np.diff(corners[:, :2], axis=0)
         self._lengths = np.hypot(*leg_vectors.T)
@@ -239,7 +239,7 @@ def camera_notes(
 ) -> tuple[str, ...]:
     """Return notes on trigger distances that contradict the camera's settings, or are too short for the camera.
 
-    airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
+    airspeed_factor: function that returns the ratio of true airspeed to the route's airspeeds at an altitude, m AMSL.
     """
     notes, spacings, courses = [], camera_spacing(mission, route)[:-1], leg_courses(route.positions)
     for plan in dict.fromkeys(mission.survey_plans):
@@ -271,7 +271,10 @@ def camera_notes(
 
 
 def with_photo_spacing(mission: Mission, survey: Survey, spacing: float) -> Mission:
-    """Return the mission with another distance between the photos of a survey, m, in its items and its settings."""
+    """Return the mission with another distance between a survey's photos, in its items and settings.
+
+    spacing: new distance, m.
+    """
 
     def has_spacing(value: float | None) -> bool:
         """Return True if a value is the distance between photos of the survey."""
@@ -549,15 +552,13 @@ def _make_survey(
     """Build a survey from successive lines; return None if they have too few different lateral positions.
 
     `_MIN_LINES` positions are needed, or `_MIN_LINES_WITH_PHOTOS` if photos are taken on every line.
-
-
     camera: distance between photos on each leg, (w,) m.
     turn_arounds: two distances for each survey of the ground station; see `find_surveys`.
     """
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
     midpoints = np.array([runs.midpoint(line) for line in chain])
     _, offsets, _ = LineAxis(points[run_start : run_end + 1]).project(midpoints)
-    # Gaps between lines; a line flown twice counts once.
+    # Gaps between lines; a line flown twice is one line.
     all_gaps = [float(gap) for gap in np.diff(np.sort(offsets)) if gap >= _MIN_LINE_SPACING_M]
     gaps = []
     for k, gap in enumerate(all_gaps):

@@ -150,8 +150,8 @@ def parse_mission(text: str, source: str) -> Mission:
     source: name of the mission in messages; a name that ends with ``.plan`` also selects a `.plan`.
 
     The reader of WPL 110 accepts CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, and
-    more than seven decimals (rounded to the 1e-7 degrees of MISSION_ITEM_INT).  Items and the targets of jumps are
-    numbered by lines, as in Mission Planner, QGroundControl and MAVProxy.  The column seq only shows whether the first
+    more than seven decimals (rounded to the 1e-7 degrees of MISSION_ITEM_INT). Items and the targets of jumps are
+    numbered by lines, as in Mission Planner, QGroundControl and MAVProxy. The column seq only shows whether the first
     line is home.
 
     Raises MissionError with file, line, field, value and allowed values.

@@ -431,7 +431,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
 def _expand_complex_items(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
     """Replace the ComplexItems in a plan's JSON data by the simple items that they contain, in place.
 
-    Returns warnings, and the settings of each survey.  Raises MissionError if the data is not a plan.
+    Returns warnings, and the settings of each survey. Raises MissionError if the data is not a plan.
     """
     if not isinstance(data, dict):
         message = f'{source}: expected a JSON object with fileType "Plan", got {type(data).__name__}'

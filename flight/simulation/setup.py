@@ -216,7 +216,7 @@ class FlightSetup:
     engine: flight model to use; both give the same flight.
     imported_log: the imported log that the flight comes from; None for a flight by planfly.
     demanded_route: route with the airspeeds that are demanded in flight, where the autopilot ignores or limits a
-        command.  An imported flight keeps the commanded airspeeds: the limits of its autopilot may be unknown.
+        command. An imported flight keeps the commanded airspeeds: the limits of its autopilot may be unknown.
     path: reference path from the demanded route and the limits.
     """
 

@@ -23,7 +23,7 @@ from flight.dynamics.model_program import UnsupportedModel
 from flight.dynamics.trim import steady_flight
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.navigation_error import ERRORS, start_navigation
+from flight.guidance.navigation_error import ERRORS, start_navigation_error
 from flight.guidance.path import FlyByPath, fly_by_path, waypoint_records
 from flight.mission.ground_phases import GroundPhases, TakeOff
 from flight.simulation.setup import EngineChoice, FlightSetup
@@ -146,7 +146,7 @@ def make_loop(
 
 # Default duration of a guidance tick, s; `Flight.dt` is the duration in one flight.
 TICK_S = 1.0 / 60.0
-# Duration of the rows that are flown at once, s.
+# Flight time simulated in one call of `RunningFlight.fly_block`, s.
 BLOCK_DURATION_S = 1.0
 # The same for a flight that is neither recorded nor shown; 40 us are spent in Python for each block.
 LONG_BLOCK_DURATION_S = 10.0
@@ -163,7 +163,7 @@ MIN_GROUND_SPEED_MPS = 3.0
 
 
 # ----------------------------------------------------------------------
-# The map and the ground around one flight, in the form that the compiled loop needs.  JSBSim provides latitudes and
+# The map and the ground around one flight, in the form that the compiled loop needs. JSBSim provides latitudes and
 # longitudes; all other code uses positions on the map.
 
 # Margin of the local map around the area and the route, m.
@@ -199,7 +199,7 @@ class LocalMap:
         )
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
-        """Return the grid convergence at a position, rad: the map course of true north."""
+        """Return the grid convergence, the map course of true north, at a position (degrees), rad."""
         lon = self.center_longitude + math.remainder(math.radians(lon_deg) - self.center_longitude, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
 
@@ -329,10 +329,10 @@ class RunningFlight:
     """One flight in progress, advanced by `fly_block`.
 
     dt: duration of a tick, s.
-    setup: setup of the flight, with the program that flies once that is known.
+    setup: setup of the flight; it names the external autopilot program once that program is known.
     path: reference path.
     map: local map from JSBSim's positions, around area and route.
-    guidance_memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    guidance_memory: internal state of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the simulated aircraft.
     start: start of the route, with the airspeed limited to the aircraft's range.
     max_ticks: time limit, ticks.
@@ -485,7 +485,7 @@ class RunningFlight:
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         if launch_end is not None:
-            self._work.commands = release(self.fdm, launch_end, commands)
+            self._work.commands = release_aircraft(self.fdm, launch_end, commands)
             self._work.air.wind_north, self._work.air.wind_east = launch_end.wind[:2]
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
@@ -602,10 +602,11 @@ def find_release(
     """Return the state of the aircraft at the end of its launch, or at rest on a runway.
 
     local_map, ground: local map and terrain of the flight.
+    aircraft: aircraft whose wheels determine its height above a runway.
     take_off: the take-off that is simulated.
     """
     launch = take_off.launch
-    position, velocity = take_off.release()
+    position, velocity = take_off.release_state()
     if launch.method == "runway":
         stand_heights = [contact.down for contact in find_contacts(aircraft, "wheels") if contact.is_support]
         position[2] += max(stand_heights, default=0.0)
@@ -630,11 +631,12 @@ def _to_true_north(east: float, north: float, convergence: float) -> tuple[float
     return north * cos + east * sin, east * cos - north * sin
 
 
-def release(
+def release_aircraft(
     fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Put the aircraft into the state at the end of its launch, with control commands; return these commands.
+    """Put the aircraft into the state at the end of its launch, with control commands; return them.
 
+    release_state: position, attitude, velocity, wind and ground at the release.
     commands: elevator, aileron, rudder (rad) and throttle (0..1).
     """
     fdm.release(

@@ -126,7 +126,7 @@ WORKSPACE_NUMBERS = WORKSPACE.itemsize // 8
 
 
 class Workspace:
-    """Record and path of one flight in one block of memory, with views of the data exchanged with JSBSim.
+    """Record and path of one flight in one block of memory, with views of the data that JSBSim reads and writes.
 
     Numba checks the type of each argument of a call, and takes twice as long for a record as for an array of numbers.
     Therefore all data is passed to compiled code as one block.
@@ -461,8 +461,8 @@ def _update_wind(
 ) -> None:
     """Write the mean wind and the next gust at the aircraft's position into the record ``air``.
 
-    The components are along true north, east and down.  The mean wind has no vertical component.  Without turbulence
-    (`wind.w20` is 0) the gust in the record stays as it is.
+    The components are along true north, east and down. The mean wind has no vertical component. Without turbulence
+    (`wind.w20` is 0) the gust in the record does not change.
 
     wind: record of `MEAN_WIND`.
     gusts, noise: state of the gust filters, and random numbers of the tick.

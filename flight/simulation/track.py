@@ -193,7 +193,7 @@ def join_tracks(parts: list[Track]) -> Track:
 
 # Empty array of rows, the result of joining no parts.
 _NO_ROWS = np.zeros(0, TRACK_ROW)
-# Reciprocal resolution of each column but the time.  It is a power of two, so that products with it and with its
+# Reciprocal resolution of each column but the time. It is a power of two, so that products with it and with its
 # reciprocal are exact.
 _STEPS_PER_UNIT = np.exp2(
     [DIGITS.get(name, 0) for name, width in COLUMNS.items() if name != "time" for _ in range(width)]
@@ -437,7 +437,7 @@ _MIN_ADDED_ROWS = 6_000
 
 
 class TrackBuilder:
-    """Build the track of a flight while it is flown, in half the memory of the flown rows.
+    """Builder of a flight's track while it is flown; it needs half the memory of the flown rows.
 
     >>> import numpy as np
     >>> builder = TrackBuilder()

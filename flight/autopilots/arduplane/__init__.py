@@ -1,1 +1,1 @@
-"""ArduPlane by its control law: parameters, one compiled tick, and its deviations from a plan."""
+"""Simulated ArduPlane: its parameters, its compiled control law, and its deviations from a plan."""

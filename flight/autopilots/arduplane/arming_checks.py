@@ -1,7 +1,7 @@
 """Describe settings with which ArduPlane does not arm; they leave the verdict undecided.
 
 Read from ArduPlane 4.6.3 and 4.7: `AP_Arming::pre_arm_checks` and `AP_Arming_Plane::pre_arm_checks` call the functions
-that each check names.  A battery is full, and the aircraft stands at home with its throttle stick at idle.
+that each check names. A battery is full, and the aircraft stands at home with its throttle stick at idle.
 """
 
 import math

@@ -306,8 +306,9 @@ class ArduPlane(Autopilot):
     def _landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
         """Return the true airspeed on the landing glide, m/s, by TECS_LAND_ARSPD and LAND_WIND_COMP.
 
-        ``cruise`` is not used. Without TECS_LAND_ARSPD the airspeed follows from AIRSPEED_CRUISE and AIRSPEED_MIN.
+        Without TECS_LAND_ARSPD the airspeed follows from AIRSPEED_CRUISE and AIRSPEED_MIN.
 
+        cruise: not used; it belongs to the interface of `GroundRules.airspeed`.
         tail_wind: m/s, negative for a head wind.
         amsl: altitude of the landing point, m.
         """
@@ -355,11 +356,11 @@ class ArduPlane(Autopilot):
             ),
             # An RTL that follows the terrain is not simulated.
             unsimulated_text=lambda mission: "terrain" if parameters.rtl_follows_terrain else "",
-            unjudged_texts=self._unjudged_return_texts,
+            unjudged_texts=self._unjudged_rtl_parts,
             trials=ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb"),
         )
 
-    def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
+    def _unjudged_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
         """Return the parts of a mission's RTLs that are not simulated.
 
         These are the mission's return path, which an RTL follows if RTL_AUTOLAND is 4, and the settings that are not
@@ -461,7 +462,8 @@ class ArduPlane(Autopilot):
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
     """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter.
 
-    previous_record, record: records of the control law before and after the change; the memory of the second is set.
+    previous_record, record: records of the control law before and after the change; the internal state in the second
+        is set.
     start: position, (3,) m.
     """
     record.memory = previous_record.memory
@@ -582,7 +584,7 @@ _RETURN_PATH_TEXT = (
     " RTL ends in its loiter"
 )
 
-# `Plane::verify_loiter_heading` waits for the heading to the position of the next item.  The position of an RTL item is
+# `Plane::verify_loiter_heading` waits for the heading to the position of the next item. The position of an RTL item is
 # 0 N 0 E.
 _EXIT_BEFORE_RTL_TEXT = (
     "ArduPlane leaves the loiter on the heading to 0° N 0° E, because an RTL item has no position. The simulated flight"
@@ -593,7 +595,7 @@ _EXIT_BEFORE_RTL_TEXT = (
 _CLEAR_AT_START = 1 << 0
 # ArduPlane ignores a radius up to this value, m.
 _MAX_IGNORED_RADIUS_M = 1.0
-# The radius of LOITER_TURNS is stored in a byte, in whole metres or, from this on, in tens of metres.  Loiters without
+# The radius of LOITER_TURNS is stored in a byte, in whole metres or, from this on, in tens of metres. Loiters without
 # end and to an altitude have sixteen bits (`AP_Mission::mavlink_int_to_mission_cmd`).
 _MAX_BYTE_RADIUS_M = 255.0
 

@@ -86,7 +86,10 @@ def failsafe_causes(
 
 
 def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
-    """Return the long failsafe of a lost remote control, and before it the short failsafe if it leaves AUTO."""
+    """Return the loss of the remote control, with ArduPlane's reaction by the long failsafe.
+
+    A short failsafe that leaves AUTO comes before it. If the loss starts no failsafe, the only reaction is "on".
+    """
     long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
     # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
     if parameters.throttle_failsafe != 1.0:
@@ -103,7 +106,7 @@ def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
 
 
 def _station_cause(parameters: ArduPilotParameters) -> Cause:
-    """Return ArduPlane's reaction to the loss of the ground station's heartbeats."""
+    """Return the loss of the ground station's heartbeats, with ArduPlane's reaction."""
     if parameters.station_failsafe <= 0.0:
         return Cause("station lost", "on", "FS_GCS_ENABL", 0)
     long_action = int(parameters.long_failsafe)

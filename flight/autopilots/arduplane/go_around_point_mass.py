@@ -1,11 +1,11 @@
 """Simulate a go-around with a point mass in a few milliseconds, up to the return to the landing approach.
 
 The simulation follows `AP_Landing::type_slope_verify_abort_landing`, `restart_landing_sequence` (libraries/AP_Landing)
-and `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  The aircraft climbs
-with level wings at the pitch of the last take-off and open throttle until it is above the go-around altitude, which is
-relative to *home*: at an airfield above home, the climb may end at once.  Then it joins the nearest landing sequence:
-it takes the shorter turn to the first stop of the sequence, on a straight slope from its altitude, and then flies the
-other stops.
+and `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6. The aircraft climbs
+with level wings at the pitch of the last take-off and with open throttle, until it is above the go-around altitude.
+This altitude is relative to *home*: at an airfield above home, the climb may end at once. Then it joins the nearest
+landing sequence: it takes the shorter turn to the first stop of the sequence, on a straight slope from its altitude,
+and then flies the other stops.
 
 The point mass and the control law are the same as in `flight.autopilots.arduplane.rtl_point_mass`.
 """

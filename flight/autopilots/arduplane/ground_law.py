@@ -1,21 +1,22 @@
 """Run one compiled tick of ArduPlane's take-off or landing, in a flight that begins or ends on the ground.
 
-In the air the law is `flight.autopilots.arduplane.law`.  Take-off and landing use the same law with other parameters
+In the air the law is `flight.autopilots.arduplane.law`. Take-off and landing use the same law with other parameters
 and demands:
 
-Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): wings level until the ground speed has
-been above 5 m/s, in 4.6 for two seconds; then the course over the ground at that time is held as heading, less the yaw
-since the launch.  Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up
-to TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, or TKOFF_PLIM_SEC after
-leveling off began.  The next leg begins at the aircraft, and follows no line.
+Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): the wings are level until the ground
+speed has been above 5 m/s (in 4.6 for two seconds). Then the aircraft holds a heading: the course over the ground at
+that time, less the yaw since the launch. The throttle is open. The pitch controls the airspeed, but is never below the
+pitch of the item. The bank is limited to LEVEL_ROLL_LIMIT up to TKOFF_LVL_ALT, and unrestricted from three times that
+height. The take-off ends above the item's altitude, or TKOFF_PLIM_SEC after leveling off began. The next leg begins at
+the aircraft, and follows no line.
 
-Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the extended line to the landing point, on the glide of
-`flight.autopilots.arduplane.landing`.  The approach stage begins when the aircraft is lined up, or at once after a
-NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE.  From then on the flare may begin: below LAND_FLARE_ALT,
-or LAND_FLARE_SEC before the ground at the current sink rate on the second half, or beyond the point.  In the flare the
-motor is off, bank is at most LEVEL_ROLL_LIMIT, pitch at least LAND_PITCH_DEG, and pitch controls the sink rate to
-TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over airspeed.  ArduPlane's real touchdown sink rate is
-known less well: see `docs/measured.md`.
+Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): the aircraft follows the extended line to the landing point, on the
+glide of `flight.autopilots.arduplane.landing`. The approach stage begins when the aircraft is lined up, or at once
+after a NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE. From then on the flare may begin: below
+LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at the current sink rate on the second half of the line, or beyond
+the landing point. In the flare the motor is off, the bank is at most LEVEL_ROLL_LIMIT, and the pitch at least
+LAND_PITCH_DEG. The pitch controls the sink rate to TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over
+airspeed. ArduPlane's real touchdown sink rate is known less well: see `docs/measured.md`.
 """
 
 import math
@@ -227,7 +228,7 @@ def ground_loop(
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
-    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.
     frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
         motion, registers, instructions, landing-gear contacts and scratch for their friction.
@@ -316,7 +317,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
     above its end altitude, or once the aircraft has leveled.
 
     work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
-    arduplane: parameters and memories of the control law and of take-off and landing; updated.
+    arduplane: parameters and internal states of the control law and of take-off and landing; updated.
     waypoints: `WAYPOINT` records of the route, (w,).
     pieces: pieces of the reference path.
     """
@@ -476,7 +477,7 @@ def _begin_first_leg(
     pieces: pieces of the reference path; the guidance advances to the first one of the leg.
     guidance: `GUIDANCE_MEMORY` record; its piece is updated.
     ground: state of take-off and landing; its stage becomes `IN_AIR`.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     """
     ground.stage = IN_AIR
     memory.leg = ground.leg
@@ -500,7 +501,7 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
     closes at its slew rate.
 
     work: state, commands and settings of the flight, a `WORKSPACE` record; updated.
-    arduplane: parameters and memories of the control law and of take-off and landing; updated.
+    arduplane: parameters and internal states of the control law and of take-off and landing; updated.
     landing_point: record of `flight.guidance.lateral_reference_laws.WAYPOINT` for the landing point.
     """
     state = work.state

@@ -1,8 +1,8 @@
 """Compute ArduPlane's landing glide and the height of its go-around.
 
-From the waypoint before the landing point ArduPlane flies a straight slope to the start of the flare.  The height of
+From the waypoint before the landing point ArduPlane flies a straight slope to the start of the flare. The height of
 the flare is the sink rate of the slope times LAND_FLARE_SEC, at most twice LAND_FLARE_ALT; its length is the distance
-flown while the sink rate falls to TECS_LAND_SINK.  Follows
+flown while the sink rate falls to TECS_LAND_SINK. Follows
 `AP_Landing::type_slope_setup_landing_glide_slope` and `type_slope_get_target_airspeed_cm`
 (libraries/AP_Landing/AP_Landing_Slope.cpp) in ArduPlane 4.6.
 """

@@ -1,6 +1,6 @@
 """Compute when ArduPlane starts the motor of a launched aircraft, from acceleration, speed and attitude.
 
-With TKOFF_THR_MINACC ArduPlane waits for an acceleration along the nose, and then for TKOFF_THR_DELAY.  Within a tenth
+With TKOFF_THR_MINACC ArduPlane waits for an acceleration along the nose, and then for TKOFF_THR_DELAY. Within a tenth
 of a second after that the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees;
 otherwise ArduPlane waits for an acceleration again (`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane
 4.6). Without TKOFF_THR_MINACC it waits only for the speed; without both parameters the motor starts with the mission.

@@ -1,4 +1,4 @@
-"""Implement ArduPlane's control law as compiled code: its memory, the altitude demand on a leg, and one tick."""
+"""Implement ArduPlane's control law as compiled code: its internal state, the altitude demand, and one tick."""
 
 import math
 
@@ -11,7 +11,7 @@ from flight.autopilots.arduplane.tecs import airspeed_target, limited_nav_roll, 
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
+from flight.guidance.path import find_on_path, pass_sharp_corners, profile_at
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.tick import (
     MISSED_ROUTE_DISTANCE_M,
@@ -32,7 +32,7 @@ from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import pixel_height
 
 # ----------------------------------------------------------------------
-# Memory of ArduPlane's control law from tick to tick.
+# Internal state of ArduPlane's control law, kept from tick to tick.
 
 ARDUPILOT_MEMORY = record_dtype(
     "time_to_update",  # s until the next navigation update
@@ -126,7 +126,7 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     target: the leg's end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     dt: duration of a tick, s.
     """
     if target.is_rtl:
@@ -257,7 +257,7 @@ def update_terrain_lookahead(
     heights: ground heights of the terrain by pixel, m.
     waypoints: `WAYPOINT` records of the route, (w,).
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     """
     target = waypoints[memory.leg + 1]
     # Before the first update of the control law, the start of the first leg is not set.
@@ -338,7 +338,7 @@ NAVIGATION_TICK_S = 0.1
 ROLL_LAG_RATIO = 0.84
 # Lag of the pitch behind its demand, as a ratio to PTCH2SRV_TCONST.
 PITCH_LAG_RATIO = 1.1
-# Initial value of the SKE integrator, m^2/s^3.  The two pitch integrators balance each other, so steady flight does not
+# Initial value of the SKE integrator, m^2/s^3. The two pitch integrators balance each other, so steady flight does not
 # determine it; the flight before the first waypoint has left 12 to 39, 27 on average, in 18 flights of ArduPlane.
 INITIAL_SKE_INTEGRATOR = 27.0
 # Limit of the pitch rate, rad/s.
@@ -391,7 +391,7 @@ def arduplane_loop(
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
-    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.
     frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
         motion, registers, instructions, landing-gear contacts and scratch for their friction.
@@ -419,7 +419,7 @@ def control_as_ardupilot(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` s, and update the memories ``guidance`` and ``memory``.
+    """Compute the commands for one tick of ``dt`` s, and update the records ``guidance`` and ``memory``.
 
     ArduPlane's navigation and TECS run every `NAVIGATION_TICK_S`, its attitude controllers in each tick. ArduPlane does
     not use the path: the track is only measured against it. ``guidance`` records the end of the last loiter or RTL.
@@ -427,8 +427,9 @@ def control_as_ardupilot(
     state, estimated: true attitude, airspeed and rates, a `STATE` record, and estimated motion, a `MOTION` record.
     pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
     waypoints: `WAYPOINT` records of the route, (w,).
-    gains, guidance: gains of the inner loops, and their memory with the progress on the path.
-    parameters, memory: ArduPlane's parameters, and the memory of its control law, an `ARDUPILOT_MEMORY` record.
+    gains, guidance: gains of the inner loops, and a `GUIDANCE_MEMORY` record with their state and the progress on the
+        path.
+    parameters, memory: ArduPlane's parameters, and the internal state of its law, an `ARDUPILOT_MEMORY` record.
     commands: `COMMANDS` record to fill.
     """
     find_on_path(estimated, pieces, guidance)
@@ -459,7 +460,7 @@ def control_as_ardupilot(
         # Skip the rest of a loiter that ArduPlane left earlier than the path does.
         while pieces[guidance.piece].leg < memory.leg_after_loiter - 1 and guidance.piece + 1 < pieces.shape[0]:
             guidance.piece += 1
-        leave_sharp_corners(pieces, guidance, memory.leg)
+        pass_sharp_corners(pieces, guidance, memory.leg)
         update_height_demand(estimated, waypoints[memory.leg + 1], parameters, memory, NAVIGATION_TICK_S)
         commanded_airspeed, target = waypoints[memory.leg].airspeed, waypoints[memory.leg + 1]
         target_airspeed = airspeed_target(state, estimated, commanded_airspeed, target, parameters, memory, eas2tas)
@@ -472,7 +473,7 @@ def control_as_ardupilot(
 def initialise_memory(
     state: Record, estimated: Record, waypoints: Records, guidance: Record, parameters: Record, memory: Record
 ) -> None:
-    """Initialise the control law's memory for steady flight at the first waypoint.
+    """Initialise the control law's internal state for steady flight at the first waypoint.
 
     Follows `AP_TECS::_initialise_states`.
 
@@ -520,9 +521,9 @@ def control_attitude(
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     gains: gains of the inner loops, a `GAINS` record.
-    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
+    guidance: state of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     eas2tas: ratio of true to equivalent airspeed.
     commands: `COMMANDS` record to fill.
     dt: duration of a tick, s.

@@ -2,13 +2,13 @@
 
 L1 guidance follows Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) with
 the parameters of ArduPlane's documentation (ardupilot.org, Plane, "Navigation Tuning") and the formulas of
-`flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second and holds its demands in between.
+`flight.guidance.lateral_reference_laws`. ArduPlane navigates ten times a second and holds its demands in between.
 
-Loiters follow ArduPlane's `Plane::update_loiter`, `verify_loiter_*` and `ModeLoiter::isHeadingLinedUp`.  The aircraft
+Loiters follow ArduPlane's `Plane::update_loiter`, `verify_loiter_*` and `ModeLoiter::isHeadingLinedUp`. The aircraft
 follows the line to the center of the loiter until it is within three radii, then steers to the center until the loiter
-demands the sharper turn, and then flies around.  Turns, time and altitude are measured from there on.  Once they are
+demands the sharper turn, and then flies around. Turns, time and altitude are measured from there on. Once they are
 complete, it keeps loitering until the tangent at its position leads to the next waypoint, within ten degrees plus ten
-for each lap of waiting.  The next leg's line begins at the loiter's center, or at the aircraft if the item says so.
+for each lap of waiting. The next leg's line begins at the loiter's center, or at the aircraft if the item says so.
 The radius grows with altitude as the square of the ratio of true to equivalent airspeed
 (`AP_L1_Control::loiter_radius`).
 """
@@ -179,7 +179,7 @@ def _follow_line(
     dt: s.
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     from_e, from_n = (estimated.east, estimated.north) if without_crosstrack else (memory.from_east, memory.from_north)
     angle, aim_angle = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
@@ -202,7 +202,7 @@ def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: f
     angle: angle from the direction to the L1 point to the ground velocity, rad (`-Nu`).
     target_e, target_n: position that the aircraft flies to, m.
     estimated: estimated position and velocity over the ground, a `MOTION` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     bearing = math.atan2(target_e - estimated.east, target_n - estimated.north)
@@ -224,7 +224,7 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
     center of the loiter. A leg to an item that repeats the position of the item before it begins at the aircraft.
 
     waypoints: `WAYPOINT` records of the route, (w,).
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
@@ -243,14 +243,14 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
 
 @inner
 def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
-    """Begin the leg with the index ``leg``, and reset the memory of the last loiter.
+    """Begin the leg with the index ``leg``, and reset the progress of the last loiter.
 
     The line to follow usually starts at the first waypoint of the leg. It starts at the aircraft's position if the
     aircraft leaves a loiter on a tangent, or if the aircraft is already past the leg's end.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     start, target = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -294,7 +294,7 @@ def _is_leg_over(
     eas2tas: ratio of true to equivalent airspeed.
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
     if (
@@ -334,7 +334,7 @@ def _update_loiter(
     loiter: waypoint on the loiter; its loiter_radius (m) is the radius at the altitude of the waypoint. The radius
         grows with the square of the true airspeed.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     l1_distance, ground_speed: L1 distance, m, and ground speed, m/s.
     eas2tas, dt: ratio of true to equivalent airspeed, and duration of a tick, s.
     """
@@ -383,7 +383,7 @@ def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: 
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     loiter: waypoint on the loiter, a `WAYPOINT` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     dt: duration of a tick, s.
     """
     bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
@@ -408,7 +408,7 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
     `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     if not memory.loiter_started:
         return False
@@ -477,7 +477,7 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     rtl: loiter at the RTL's end, a `WAYPOINT` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     eas2tas: ratio of true to equivalent airspeed.
     """
     if not memory.is_in_rtl:
@@ -517,7 +517,7 @@ def _loiter_acceleration(
     """Return the lateral acceleration that a loiter demands, m/s^2 (`AP_L1_Control::update_loiter`).
 
     The aircraft steers straight to the center until the circle demands the sharper turn; then it flies around the
-    circle. From that moment the loiter counts as reached, even if a gust or too small a radius takes the aircraft
+    circle. From that moment the loiter is treated as reached, even if a gust or too small a radius takes the aircraft
     outside the circle.
 
     radius: radius of the circle, m.
@@ -525,7 +525,7 @@ def _loiter_acceleration(
     ground_speed: m/s.
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north

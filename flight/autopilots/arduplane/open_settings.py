@@ -143,7 +143,7 @@ _FUNCTIONS_BY_PART = {
     "elevator": (19.0, 79.0, 80.0, *_ELEVON_FUNCTIONS),
     "motor": (70.0, 73.0, 74.0),
 }
-# Pitch rate that a flight needs besides that of its turns, deg/s: a change of 10 deg within a second.
+# Pitch rate that a flight needs in addition to the pitch rate of turns, deg/s: a change of 10 deg within a second.
 _PITCH_CHANGE_RATE_DEGPS = 10.0
 # Highest bank for which ArduPlane computes the pitch rate of a turn, rad.
 _MAX_COORDINATED_BANK_RAD = math.radians(80.0)

@@ -1,8 +1,8 @@
 """Define ArduPlane's parameters for a mission, in SI units and radians.
 
 Names, units, ranges and defaults are from ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.7); an
-older name stands next to the present name, with the factor to the present unit.  A parameter is taken from the first
-source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults.  Parameters
+older name stands next to the present name, with the factor to the present unit. A parameter is taken from the first
+source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults. Parameters
 that 4.6 does not have are not read for 4.6, which uses a fixed value instead.
 """
 
@@ -297,7 +297,7 @@ class ArduPilotParameters(ParameterSet):
     throttle_min, throttle_max, throttle_cruise: 0..1.
     throttle_slew: maximum change of the throttle, fraction of its range per second; 0 for no limit.
     altitude_slope_min: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown as a
-        step.  The parameter's value 0, which makes every change a step, is stored as inf.
+        step. The parameter's value 0, which makes every change a step, is stored as inf.
     altitude_slope_threshold: height above a climbing slope at which the slope is redrawn, m; 0 for never.
     climb_slope_height: height above home, m, below which 4.7 climbs to the altitude of the leg's end at once; in 4.6 a
         climb that begins below it is a step.
@@ -313,11 +313,11 @@ class ArduPilotParameters(ParameterSet):
     rtl_climb_min: height that an RTL climbs before it turns, m.
     level_roll_limit: bank limit during this climb, rad.
     flight_options: bits; with bit 4 an RTL climbs to its altitude before it turns, with bit 14 climbs are steps.
-    rally_limit: maximum distance to the nearest rally point, m; an RTL ignores a rally point that is further away.  0
+    rally_limit: maximum distance to the nearest rally point, m; an RTL ignores a rally point that is further away. 0
         for no limit.
     rally_includes_home: 1 if an RTL goes home when home is nearer than any rally point; 0 if not.
-    rtl_autoland: 0 if an RTL stays in its loiter; with 1 it continues to the mission's landing sequence, with 2 it goes
-        straight there; with 3 the sequence is for go-arounds only; with 4 it uses the mission's return path.
+    rtl_autoland: 0 if an RTL stays in its loiter. With 1 it continues to the mission's landing sequence, with 2 it
+        flies straight there. With 3 the sequence is for go-arounds only. With 4 the RTL uses the mission's return path.
     terrain_enable: 1 if ArduPlane has terrain data.
     terrain_lookahead: distance over which ArduPlane looks ahead for rising ground on a leg above terrain, m.
     terrain_spacing: distance between the samples of the terrain, m.
@@ -338,8 +338,9 @@ class ArduPilotParameters(ParameterSet):
     takeoff_level_height: height, m, up to which the bank of a take-off is limited to ``level_roll_limit``; the bank is
         not limited above three times this height.
     takeoff_leveling: time before the end of the take-off at which the aircraft begins to level off, s.
-    takeoff_slew: as ``throttle_slew``, in a take-off; 0 for ``throttle_slew``, negative for no limit.
-    takeoff_throttle: 0..1; 0 for ``throttle_max``.
+    takeoff_slew: maximum change of the throttle in a take-off, fraction of its range per second; 0 for
+        ``throttle_slew``, negative for no limit.
+    takeoff_throttle: throttle of a take-off, 0..1; 0 for ``throttle_max``.
     landing_pitch: minimum pitch in the flare, rad.
     landing_pitch_max: maximum pitch in a landing, rad; 0 for ``pitch_limit_max``.
     landing_speed_weight: speed weight of TECS in a landing; negative for a weight that falls to 0 on the last leg.
@@ -551,8 +552,8 @@ class ArduPilotParameters(ParameterSet):
         """Radius of the RTL loiter, m at sea level, negative to the left.
 
         It is RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is at most 1 m, or 60 m if both are at most 1 m. The sign is
-        that of RTL_RADIUS unless RTL_RADIUS is 0. Follows `ModeRTL::navigate` in ArduPlane/mode_rtl.cpp and
-        `Plane::update_loiter` in navigation.cpp.
+        the sign of RTL_RADIUS, or of WP_LOITER_RAD if RTL_RADIUS is 0. Follows `ModeRTL::navigate` in
+        ArduPlane/mode_rtl.cpp and `Plane::update_loiter` in navigation.cpp.
 
         >>> parameters = ArduPilotParameters.defaults()
         >>> [parameters.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]

@@ -1,6 +1,6 @@
 """Find the ArduPlane release of a program, of a flight log and of a parameter file.
 
-A ground station may write the release as a comment at the head of a parameter file.  In other files the names show it,
+A ground station may write the release as a comment at the head of a parameter file. In other files the names show it,
 because 4.7 renamed parameters (`conversion_table` in ArduPlane/Parameters.cpp).
 """
 
@@ -87,7 +87,7 @@ def choose_release(requested_version: ArduPlaneVersion | None, params: str) -> R
 
     The result has a note if parameters of the file have another name in this release.
 
-    params: path of the parameter file.  Raises ParameterError if it cannot be read.
+    params: path of the parameter file. Raises ParameterError if it cannot be read.
     """
     file = Path(params)
     text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)

@@ -1,7 +1,7 @@
 """List the parameters of fixed-wing aircraft that ArduPlane 4.5, 4.6 and 4.7 renamed.
 
 The names are from ArduPlane's release notes, its parameter reference of 4.4 to 4.7, and the conversion tables of
-ArduPlane/Parameters.cpp and libraries/AP_GPS/AP_GPS.cpp.  Parameters of lift motors (Q_*) and of ArduPilot's own
+ArduPlane/Parameters.cpp and libraries/AP_GPS/AP_GPS.cpp. Parameters of lift motors (Q_*) and of ArduPilot's own
 simulator (SIM_*) are left out, as are parameters whose meaning changed with the name (ARMING_CHECK, SYSID_ENFORCE).
 """
 

@@ -1,13 +1,13 @@
 """Simulate an RTL with a point mass in about 2 ms, at least 100 times faster than JSBSim.
 
 The control law is the compiled code of `flight.autopilots.arduplane.law`: L1 to the target, the slope or the climb, and
-TECS with its limits.  It controls a `flight.autopilots.point_mass.PointMass`, whose bank and pitch follow
-their demands with the lags of ArduPlane's controllers.  The minimum clearance is within 7 m of the minimum clearances
+TECS with its limits. It controls a `flight.autopilots.point_mass.PointMass`, whose bank and pitch follow
+their demands with the lags of ArduPlane's controllers. The minimum clearance is within 7 m of the minimum clearances
 of 38 flights of ArduPlane (`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
 
-After an engine failure the control law does not know that there is no thrust: it demands full throttle, slows down to
-underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`), holds the minimum airspeed from then on, and dives
-onto its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
+After an engine failure the control law does not know that there is no thrust: it demands full throttle and slows down
+to underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`). From then on it holds the minimum airspeed, and
+dives onto its slope where it meets the slope. Fourteen such flights of ArduPlane are reproduced as well
 (`tests/flight/autopilots/arduplane/test_engine_out.py`).
 """
 
@@ -275,7 +275,7 @@ def fly_stages(
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
     positions: one row a second, m. aircraft to field, heights to has_terrain: a `PointMass` and a `ReturnEnvironment`.
     """
-    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
+    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `strided_waypoints`.
     waypoints, loiter = spaced[::2], progress_records[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
     target, estimated, state, memory = waypoints[1], motions[0], states[0], memories[0]
@@ -368,7 +368,7 @@ def _is_stage_complete(
     time: time since the start, s.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     estimated: position and velocity over the ground, a `MOTION` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     dt: duration of a tick, s.
     """
     if is_before_reaction:
@@ -376,7 +376,7 @@ def _is_stage_complete(
     if climb.is_required and is_first_stage:
         # The climb lasts at least one tick.
         return time > 0.0 and estimated.up > climb.top
-    # The leg ends at the waypoint.  A loiter before a landing sequence is complete as soon as the aircraft is on its
+    # The leg ends at the waypoint. A loiter before a landing sequence is complete as soon as the aircraft is on its
     # circle and near the target altitude; the last one after one lap and `ENDLESS_LOITER_TIME_S`.
     if target.loiter_radius == 0.0:
         return memory.leg > 0
@@ -402,7 +402,7 @@ def _demand_climb(
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground, a `MOTION` record.
     climb_parameters: `ARDUPILOT_PARAMETERS` record, both of whose pitch limits are the pitch of the climb.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     climb: throttle of the climb and the rate at which it increases, a `CLIMB` record.
     airspeed_demand: equivalent airspeed, m/s.
     eas2tas: ratio of true to equivalent airspeed.
@@ -435,7 +435,7 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     stages: `WAYPOINT` records of the RTL's stages.
     waypoints: three `WAYPOINT` records that the navigator follows; the last two are overwritten.
     estimated: position and velocity over the ground, a `MOTION` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
@@ -477,7 +477,7 @@ def _initialise_memory(
     state: Record,
     memory: Record,
 ) -> None:
-    """Set the state from the motion over the ground, and the memory as after a long steady flight.
+    """Set the state from the motion over the ground, and the law's internal state as after a long steady flight.
 
     Follows `flight.autopilots.arduplane.law.initialise_memory`, which assumes level flight. In a climb or descent the
     input of the altitude demand is ahead of the aircraft by the lag of the demand.
@@ -531,7 +531,7 @@ def _update_demands(
     estimated: position and velocity over the ground, a `MOTION` record.
     waypoints: `WAYPOINT` records, (w,).
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     aircraft: the point mass, a `POINT_MASS` record.
     dt: duration of a tick, s.
     """
@@ -543,9 +543,9 @@ def _update_demands(
     update_height_demand(estimated, target, parameters, memory, dt)
     airspeed_demand = airspeed_target(state, estimated, target.airspeed, target, parameters, memory, eas2tas)
     # In a gliding turn the pitch holds the airspeed, multiplied by the square root of the load factor, so that the
-    # angle of attack stays the same.  In six of eight ArduPlane flights, the aircraft held its airspeed in this way and
-    # lost 55 m in the turn back.  In the other two, which had been sinking before, it held its altitude, slowed down,
-    # and lost half as much.  The worse case is simulated.
+    # angle of attack stays the same. In six of eight ArduPlane flights, the aircraft held its airspeed in this way and
+    # lost 55 m in the turn back. In the other two, which had been sinking before, it held its altitude, slowed down,
+    # and lost half as much. The worse case is simulated.
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
     if not is_gliding or abs(state.roll) < _TURN_BANK_RAD:

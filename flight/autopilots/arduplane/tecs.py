@@ -1,6 +1,7 @@
 """Limit ArduPlane's bank and airspeed, and demand throttle and pitch by TECS, as compiled code.
 
-The memory and the parameters are those of `flight.autopilots.arduplane.law`.
+`flight.autopilots.arduplane.law` and `flight.autopilots.arduplane.parameters` define the records of internal state and
+parameters.
 """
 
 import math
@@ -93,20 +94,20 @@ def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float,
 # Airspeed and altitude by TECS.
 #
 # TECS (Total Energy Control System, Lambregts, AIAA 83-2239) sets throttle from the error in total energy, and pitch
-# from the error in the balance between potential and kinetic energy.  The meaning of its parameters is from ArduPilot's
-# documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list).  The formulas of throttle and
+# from the error in the balance between potential and kinetic energy. The meaning of its parameters is from ArduPilot's
+# documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list). The formulas of throttle and
 # pitch were found by regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3); they reproduce the logged
-# pitch demands to eight digits.  The limits of the airspeed demand, bad descent and the fading of saturated integrators
+# pitch demands to eight digits. The limits of the airspeed demand, bad descent and the fading of saturated integrators
 # are rules of libraries/AP_TECS/AP_TECS.cpp (4.6.3), rewritten here.
 #
-# Energies are per kilogram, m^2/s^2; their rates m^2/s^3.  Speeds are true airspeeds.  Names as in AP_TECS: SPE and SKE
+# Energies are per kilogram, m^2/s^2; their rates m^2/s^3. Speeds are true airspeeds. Names as in AP_TECS: SPE and SKE
 # are potential and kinetic energy, STE their sum, SEB their balance.
 
-# Ratio of ArduPlane's airspeed reading to the true airspeed: the sensor noise raises the mean pressure.  Measured in
+# Ratio of ArduPlane's airspeed reading to the true airspeed: the sensor noise raises the mean pressure. Measured in
 # logs of 20 flights of ArduPlane 4.6 in planfly's physics: 1.0024 to 1.0030, in still air and in turbulence alike.
 AIRSPEED_READING = 1.0027
 # Fraction of a new sensor reading (ARSP.Airspeed) that enters ArduPlane's airspeed (CTUN.As), ten times a second, for
-# use at the next update.  From ArduPlane's logs.
+# use at the next update. From ArduPlane's logs.
 _READING_FRACTION = 0.3
 # Time constant of the smoothed STE rate error for throttle damping, s.
 _STE_RATE_LAG_S = 0.5
@@ -130,8 +131,8 @@ _BAD_DESCENT_ERROR_M2PS2 = 200.0
 _BAD_DESCENT_THROTTLE_FRACTION = 0.9
 # Maximum change of the SEB integrator in one update, as a fraction of its range.
 _SEB_INTEGRATOR_STEP_FRACTION = 0.1
-# Band below full throttle in which the demand is treated as saturated, 0..1.  Noise of airspeed and acceleration makes
-# the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
+# Band below full throttle in which the demand is treated as saturated, 0..1. Noise of airspeed and acceleration makes
+# the demand touch the limit now and then: the band is three standard deviations. Climbs at full throttle depend on it:
 # with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
 _SATURATION_BAND_FRACTION = 0.003
 # Smallest reduction of an airspeed increase for a minimum ground speed, m/s; a smaller reduction is not applied.
@@ -195,7 +196,7 @@ def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     tas_min: AIRSPEED_MIN as a true airspeed, m/s.
     dt: duration of a tick, s.
     """
@@ -233,7 +234,7 @@ def airspeed_target(
     commanded_airspeed: equivalent airspeed, m/s.
     waypoint: end of the leg, which states the minimum ground speed, m/s; 0 for none.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     eas2tas: ratio of true to equivalent airspeed.
     """
     target_airspeed = commanded_airspeed
@@ -267,7 +268,7 @@ def update_tecs(
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     tas_target: target true airspeed, m/s.
     eas2tas: ratio of true to equivalent airspeed.
     dt: duration of a tick, s.
@@ -330,7 +331,7 @@ def _update_speed_demand(
     demanded SKE rate fades during a long change of airspeed, because the mean rate of the change is subtracted.
 
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record; updated.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record; updated.
     tas_target, tas_min, tas_max: true airspeeds, m/s.
     eas2tas: ratio of true to equivalent airspeed.
     dt: duration of a tick, s.
@@ -371,7 +372,7 @@ def _update_throttle(
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     dt: duration of a tick, s.
     """
     # There is no reverse thrust (`Plane::apply_throttle_limits`).
@@ -412,7 +413,7 @@ def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
     the throttle stays open for a while afterwards.
 
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     """
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
@@ -442,7 +443,7 @@ def _update_pitch_integrators(
     seb_change, ske_change: changes of the integrators in this update, m^2/s^3.
     pitch_min, pitch_max: rad.
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
-    memory: memory of the control law between ticks, an `ARDUPILOT_MEMORY` record.
+    memory: internal state of the control law, an `ARDUPILOT_MEMORY` record.
     dt: duration of a tick, s.
     """
     seb_rate_per_pitch = memory.tas * GRAVITY
@@ -481,7 +482,7 @@ def _update_pitch(
     Follows `AP_TECS::_update_pitch`. SEB is the specific energy balance: potential minus kinetic energy, each weighted.
 
     state: attitude and airspeed of the aircraft, a `STATE` record.
-    parameters, memory: ArduPlane's parameters, and the memory of its control law, which is updated.
+    parameters, memory: ArduPlane's parameters, and the internal state of its control law, which is updated.
     spe_error, ske_error: errors of the specific potential and kinetic energy, m^2/s^2.
     spe_rate, ske_rate: rates of the specific potential and kinetic energy, m^2/s^3.
     is_underspeed: True to use the pitch only to regain airspeed.

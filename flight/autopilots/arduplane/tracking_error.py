@@ -1,7 +1,7 @@
 """Compute ArduPlane's deviation from the legs of a plan by simulating corners with its own guidance in the plane.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.arduplane.law` and the lag of its
-bank, to find the acceptance radius with the least deviation.  For wind, the excursion in still air at the highest
+bank, to find the acceptance radius with the least deviation. For wind, the excursion in still air at the highest
 ground speed on the leg is taken, increased by `WIND_SPREAD`.
 """
 
@@ -22,7 +22,7 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.tecs import (
     limited_nav_roll,
 )
-from flight.guidance.lateral_reference_laws import waypoint_column
+from flight.guidance.lateral_reference_laws import strided_waypoints
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.arrays import Floats
 from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
@@ -48,7 +48,7 @@ _SEARCH_ROUNDS = 2
 # Minimum acceptance radius, m, also for a straight leg: navigation errors and gusts stay within it.
 MIN_ACCEPTANCE_M = 15.0
 # Margin for wind: factor on the excursion in still air at the highest ground speed, and addition to that factor for a
-# turn of 90 degrees.  In 200 corners of 15 to 90 degrees at 25 m/s, with 5 and 10 m/s of wind from any direction, the
+# turn of 90 degrees. In 200 corners of 15 to 90 degrees at 25 m/s, with 5 and 10 m/s of wind from any direction, the
 # factor was at most 1.17 up to 45 degrees, 1.22 at 60 degrees and 1.54 at 90 degrees.
 WIND_SPREAD = 1.1, 0.5
 # Margin for navigation errors, in standard deviations.
@@ -57,7 +57,7 @@ _NAVIGATION_SIGMAS = 3.0
 _CROSS_TRACK_M = 2.0
 # ArduPlane's deviation from its lagged altitude in light turbulence, without navigation errors, m.
 _ALTITUDE_ERROR_M = 3.0
-# Fraction of TECS_CLMB_MAX that a plan uses, by turbulence.  In a climb at full throttle the altitude demand is frozen
+# Fraction of TECS_CLMB_MAX that a plan uses, by turbulence. In a climb at full throttle the altitude demand is frozen
 # and its rate fades to 0: with larger fractions the Aerosonde was 8 to 60 m below its lagged altitude after a climb of
 # 200 m; with these fractions the error hardly exceeds the error of a climb at 2 m/s in the same gusts (four streams).
 _CLIMB_FRACTIONS = {"none": 0.9, "light": 0.65, "moderate": 0.45}
@@ -123,7 +123,7 @@ def _corner_tables(
     """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_RATIOS * airspeed
-    _measure_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
+    _measure_corners(record, airspeed, TURNS, speeds, fly_over, corners, strided_waypoints(3))
     factor, right_angle_margin = WIND_SPREAD
     corners["excursion"] *= (factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.

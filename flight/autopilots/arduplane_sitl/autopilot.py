@@ -19,7 +19,7 @@ _FLOWN_BY_PROGRAM = ("ARSPD_USE", "RLL_RATE_P", "PTCH_RATE_P")
 
 @dataclass(frozen=True)
 class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
-    """ArduPlane itself.  Before the flight, the simulated ArduPlane stands in for the program."""
+    """ArduPlane itself. Before the flight, the simulated ArduPlane stands in for the program."""
 
     log_suffix: ClassVar = ".BIN"
 
@@ -40,7 +40,10 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return a sentence that names the servo map if the aircraft's folder lacks it."""
+        """Return a sentence on the servo map if the aircraft's folder lacks it; an empty list otherwise.
+
+        Raises FlightError if the servo map is invalid.
+        """
         if (aircraft.folder / SERVO_FILE).exists():
             load_servo_map(aircraft)
             return []

@@ -66,7 +66,7 @@ class AutopilotFlight(SitlFlight):
             heading = math.degrees(self._rail.yaw) % 360.0
             launch = arduplane_launch(self._mission.home, heading, flight_parameters.values, port.port, self._link.port)
             self._process = stack.enter_context(AutopilotProcess(binary, launch))
-            port.watch = self._process.watch
+            port.check_program = self._process.check_running
             self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()

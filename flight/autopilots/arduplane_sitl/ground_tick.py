@@ -1,6 +1,6 @@
 """Run one tick of an ArduPlane SITL flight from the ground to the ground, with its phases and its end.
 
-The phases of a flight, and the events that end it, are defined in `flight.autopilots.arduplane.ground_law`.  The
+The phases of a flight, and the events that end it, are defined in `flight.autopilots.arduplane.ground_law`. The
 program reports only the number of the mission item; the phases follow from position and altitude.
 """
 
@@ -32,7 +32,7 @@ from world.kernels import Record, compiled, inner
 _LIFT_OFF_HEIGHT_M = 2.0
 # The aircraft is past the landing point if it flies away from it within this distance, m.
 _MAX_PASSING_DISTANCE_M = 500.0
-# From the start of the flare a low airspeed is no stall.  The flare is taken to begin below this multiple of the
+# From the start of the flare a low airspeed is no stall. The flare is taken to begin below this multiple of the
 # glide's flare height above the landing point ...
 _MAX_FLARE_HEIGHT_RATIO = 2.0
 # ... or below this height, m.

@@ -18,7 +18,7 @@ from world.running_clock import RunningClock
 # ArduPilot's JSON physics interface: the packets between an autopilot and its physics.
 #
 # The autopilot sends its servo outputs as a binary datagram, and waits for one JSON object with the aircraft's motion a
-# step later.  Published by ArduPilot as "JSON interface" for software in the loop
+# step later. Published by ArduPilot as "JSON interface" for software in the loop
 # (https://github.com/ArduPilot/ardupilot/tree/master/libraries/SITL/examples/JSON).
 
 # Number of outputs by the first number of a packet.
@@ -67,7 +67,7 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
 
 
 def encode_motion(motion: BodyMotion | tuple[float, ...], battery: tuple[float, float] | None = None) -> bytes:
-    r"""Return the datagram that tells ArduPlane the motion of the aircraft.
+    r"""Encode the aircraft's motion as a datagram for ArduPlane.
 
     battery: volts and amperes; None for an aircraft without a battery.
 
@@ -83,7 +83,7 @@ def encode_motion(motion: BodyMotion | tuple[float, ...], battery: tuple[float, 
 # Interval at which a wait checks whether the program still runs, s.
 _CHECK_INTERVAL_S = 0.25
 _MAX_DATAGRAM_BYTES = 1024
-# ArduPilot repeats a request only after a second.  A repeated request that arrives within this time after an answer was
+# ArduPilot repeats a request only after a second. A repeated request that arrives within this time after an answer was
 # sent before that answer arrived, s by the clock.
 _CROSSING_TIME_S = 0.1
 
@@ -92,9 +92,9 @@ class PhysicsPort:
     """Socket to which an autopilot sends its servo outputs.
 
     port: its number.
-    watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
+    check_program: function that is called while nothing arrives; it raises FlightError if the program has ended.
 
-    It sends nothing without a request.  A repeated request for a frame, which the program sends after a timeout, gets
+    It sends nothing without a request. A repeated request for a frame, which the program sends after a timeout, gets
     the same answer again, and the aircraft does not move.
     """
 
@@ -105,7 +105,7 @@ class PhysicsPort:
         # The kernel's own timeout: one system call a frame.
         check_interval = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, check_interval)
-        self.watch: Callable[[], None] = lambda: None
+        self.check_program: Callable[[], None] = lambda: None
         self._frame = -1
         self._last_answer = b""
         self._answered = 0.0
@@ -145,7 +145,7 @@ class PhysicsPort:
                     self._send(self._last_answer)
             now = self._clock()
             waiting_since = waiting_since or now
-            self.watch()
+            self.check_program()
             if now - waiting_since > SILENCE_TIMEOUT_S:
                 if data:
                     raise FlightError(
@@ -161,7 +161,10 @@ class PhysicsPort:
                 )
 
     def answer(self, data: bytes) -> None:
-        """Send ArduPlane the motion of the aircraft that follows the last received frame."""
+        """Send ArduPlane the aircraft's motion in the step after the last received frame.
+
+        data: the motion as `encode_motion` returns it.
+        """
         self._last_answer = data
         self._answered = self._clock()
         self._send(data)
@@ -197,8 +200,8 @@ class JsonLockstep(Lockstep):
         super().__init__(fdm, workspace, home, poll)
         self._port, self._servos = port, servos
 
-    def _receive_commands(self) -> Commands:
-        """Return the commands in the next servo packet of the program."""
+    def _next_commands(self) -> Commands:
+        """Wait for the next servo packet of the program, and return its commands."""
         return self._servos.commands(self._port.receive().pulses)
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:

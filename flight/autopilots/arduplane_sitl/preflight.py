@@ -55,7 +55,7 @@ class Preflight(Conversation):
         )
         if mission.rally:
             yield from self._upload(list(mission.rally), MissionType.RALLY)
-        yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
+        yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._send_home(mission.home), "home")
         yield from self._send_until_accepted(
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
             lambda: self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, _FORCE_ARMING),

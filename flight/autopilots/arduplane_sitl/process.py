@@ -78,7 +78,7 @@ SIMULATION = {
         [f"SR0_{name}" for name in ("RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3")], 0.0
     ),
 }
-# Battery voltage and current are measured, so that the autopilot's log contains them (BAT).  No battery failsafe ends a
+# Battery voltage and current are measured, so that the autopilot's log contains them (BAT). No battery failsafe ends a
 # flight: the verdict judges energy.
 _MEASURED = {"BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 0.0, "BATT_LOW_VOLT": 0.0}
 _UNMEASURED = {"BATT_MONITOR": 0.0}

@@ -47,7 +47,10 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return a sentence if the gains file is missing, because every lateral law needs its gains."""
+        """Return a sentence on the gains file if the aircraft's folder lacks it; an empty list otherwise.
+
+        Every lateral law needs the gains. Raises FlightError if the file is invalid.
+        """
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
@@ -73,7 +76,7 @@ class PlanflyGuidance(Autopilot):
 
     @property
     def deviations(self) -> Deviations:
-        """Altitude loss in downdrafts.
+        """Deviations of the guidance: it loses altitude in downdrafts, and otherwise follows its path exactly.
 
         In updrafts the guidance dives and flies faster, so it gains no altitude.
         """

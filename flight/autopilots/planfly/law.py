@@ -1,10 +1,10 @@
 """Compute planfly's guidance in compiled code, from the state to the four commands, on records with named fields.
 
-There are three lateral laws.  Planfly's own is a second-order cross-track law with curvature feed-forward about the
-offset path that a rolling aircraft can follow; it counters gusts by bank, and by a skid at the bank limit.  L1 flies
-along the legs, as in ArduPlane.  The vector field of Beard and McLain flies along the fly-by path, whose arcs are its
-fillets.  The laws share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights
-differ only by the lateral law.  No law uses the wind, because all use the velocity over the ground.  The time step is
+There are three lateral laws. Planfly's own is a second-order cross-track law with curvature feed-forward about the
+offset path that a rolling aircraft can follow; it counters gusts by bank, and by a skid at the bank limit. L1 flies
+along the legs, as in ArduPlane. The vector field of Beard and McLain flies along the fly-by path, whose arcs are its
+fillets. The laws share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights
+differ only by the lateral law. No law uses the wind, because all use the velocity over the ground. The time step is
 an argument.
 """
 
@@ -55,7 +55,7 @@ _AIRSPEED_LAG_S = 2.0
 # Multiple of the stall speed with level wings below which speed has priority over altitude immediately.
 SAFE_SPEED_RATIO = 1.2
 # The same multiple of the stall speed at the current bank; it gives the higher airspeed above 33 degrees of bank.
-# The wing can then give 1.44 or 1.21 times the lift that it needs: a margin for gusts.  With 1.2 in turns as well, an
+# The wing can then give 1.44 or 1.21 times the lift that it needs: a margin for gusts. With 1.2 in turns as well, an
 # Aerosonde with 30 % more drag strayed 0.56 m instead of 0.16 m in one of 20 winds of moderate turbulence.
 BANKED_SAFE_SPEED_RATIO = 1.1
 # Lower limit of the bank's cosine in the load factor, as in `steer_elevator`, which demands no more lift.
@@ -137,7 +137,7 @@ def planfly_loop(
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
-    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.
     frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
         motion, registers, instructions, landing-gear contacts and scratch for their friction.
@@ -163,7 +163,7 @@ def guide(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` s, and update the memory of the guidance.
+    """Compute the commands for one tick of ``dt`` s, and update the guidance's internal state.
 
     state: a `flight.dynamics.state.STATE` record.
     estimated: a `flight.guidance.navigation_error.MOTION` record.
@@ -257,7 +257,7 @@ def _cross_track_bank_command(
         pieces[piece].curvature, gains, memory, turn_acceleration, speed, crab, dt
     )
     correction = _lateral_correction(state, estimated, gains, memory, speed, course_error, crab, dt)
-    # The bank lags, so the correction leads.  A longer tick itself adds lag: with the full lead the aircraft would
+    # The bank lags, so the correction leads. A longer tick itself adds lag: with the full lead the aircraft would
     # oscillate in roll (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
     correction_rate = (correction - memory.smoothed_correction) / gains.push_smoothing
     memory.smoothed_correction += correction_rate * min(dt, gains.push_smoothing)
@@ -339,7 +339,7 @@ def _lateral_correction(
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     gains: gains of the inner loops, a `GAINS` record.
-    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
+    memory: internal state of the guidance, a `GUIDANCE_MEMORY` record; updated.
     speed: ground speed, m/s.
     course_error: ground course minus course of the path, rad.
     crab: cosine of the angle between heading and ground course.
@@ -401,7 +401,7 @@ def follow_altitude_profile(
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     nodes: altitude profile of the reference path.
     gains: gains of the inner loops, a `GAINS` record.
-    memory: memory of the guidance between ticks, a `GUIDANCE_MEMORY` record; updated.
+    memory: internal state of the guidance, a `GUIDANCE_MEMORY` record; updated.
     commands: `COMMANDS` record to fill.
     course: course of the path at the aircraft, rad.
     dt: duration of a tick, s.
@@ -467,11 +467,11 @@ def _max_upward_acceleration(
 ) -> float:
     """Return the maximum upward acceleration that the aircraft's energy allows, m/s^2.
 
-    At constant airspeed the aircraft can climb at a rate equal to its specific excess power, including that of the
-    unused throttle. Above its minimum airspeed, it may climb faster. Below its minimum airspeed, it must climb more
-    slowly, or descend, to regain speed. Near the stall the measured airspeed, gusts included, replaces the filtered
-    airspeed, because a gust can stall the aircraft within a second. In a steep turn this protection starts at a higher
-    airspeed, because the stall speed grows with the square root of the load factor.
+    At constant airspeed the aircraft can climb at a rate equal to its specific excess power at full throttle. Above its
+    minimum airspeed, it may climb faster. Below its minimum airspeed, it must climb more slowly, or descend, to regain
+    speed. Near the stall the measured airspeed, gusts included, replaces the filtered airspeed, because a gust can
+    stall the aircraft within a second. In a steep turn this protection starts at a higher airspeed, because the stall
+    speed grows with the square root of the load factor.
 
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.

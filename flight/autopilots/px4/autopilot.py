@@ -92,7 +92,7 @@ _NEUTRAL = {
     "FW_P_RMAX_NEG": _NeutralRange(60.0, math.inf),
     # No roll at all: 0 is no exception in `RollController::control_roll`.
     "FW_R_RMAX": _NeutralRange(1e-9, math.inf),
-    # A yaw rate below that of a turn, against which the rudder then steers (`YawController::control_yaw`).
+    # A limit below the yaw rate of a turn, against which the rudder then steers (`YawController::control_yaw`).
     "FW_Y_RMAX": _NeutralRange(20.0, math.inf),
     # No position: estimator, GPS, and a vehicle that is not armed.
     "EKF2_EN": _NeutralRange(1.0, 1.0, by_program=False),
@@ -168,10 +168,12 @@ class Px4(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return a PX4 with the user's parameters, else those of the aircraft's file, else the defaults.
+        """Return PX4 with parameters from the user's file, the aircraft's file, and the defaults.
 
-        The PX4 release to simulate is taken from the [flight] table if it states one, else from the comment in the
-        parameter file, else the newest release is simulated. `scenario` is part of the interface and is not used.
+        The PX4 release to simulate is the release that the [flight] table states, or else the release in the comment of
+        the parameter file, or else the newest release.
+
+        scenario: not used; it belongs to the interface of `Autopilot.load`.
         """
         writer_release = None
         if table.params is not None:
@@ -236,7 +238,7 @@ class Px4(Autopilot):
     def checks(self) -> MissionChecks:
         """Checks of PX4 before a mission (feasibility checks), from FW_LND_ANG and MIS_TKO_LAND_REQ.
 
-        If the user's file is a complete set of parameters, MIS_TKO_LAND_REQ counts as stated.
+        If the user's file is a complete set of parameters, MIS_TKO_LAND_REQ is treated as stated.
 
         >>> Px4(Px4Parameters.defaults()).checks.feasibility.requires
         2
@@ -340,15 +342,15 @@ class Px4(Autopilot):
         if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
             texts.append("FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated")
         if mission.returns:
-            texts += self._unsimulated_return_texts(mission.rally_distance)
+            texts += self._describe_unsimulated_rtl_type(mission.rally_distance)
             return_type, landing_commands = parameters["RTL_TYPE"], (*LANDINGS, Command.DO_LAND_START)
             if return_type in _TO_LANDING and not mission.commands.isdisjoint(landing_commands):
                 landing_text = "may return to the mission's landing, which is not simulated"
                 texts.append(f"RTL_TYPE {return_type:g} {landing_text}")
-            texts += self._unjudged_return_texts(mission.rally_distance)
+            texts += self._describe_unjudged_rtl_settings(mission.rally_distance)
         return texts
 
-    def _unsimulated_return_texts(self, rally_distance: float) -> Iterator[str]:
+    def _describe_unsimulated_rtl_type(self, rally_distance: float) -> Iterator[str]:
         """Describe a value of RTL_TYPE for which no RTL is simulated.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
@@ -359,7 +361,7 @@ class Px4(Autopilot):
         if return_type == _TO_RALLY_POINT and math.isinf(rally_distance):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where the RTL begins, which is not simulated"
 
-    def _unjudged_return_texts(self, rally_distance: float) -> Iterator[str]:
+    def _describe_unjudged_rtl_settings(self, rally_distance: float) -> Iterator[str]:
         """Describe settings with which a part of an RTL is not simulated, although the rest of the RTL is.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
@@ -481,8 +483,8 @@ class Px4(Autopilot):
             after_link_loss=partial(link_loss_reactions, self.parameters),
             fly=partial(fly_returns, parameters),
             causes=lambda mission: failsafe_causes(parameters, has_fence=mission.has_fence),
-            unsimulated_text=self._unsimulated_returns,
-            unjudged_texts=self._unjudged_returns,
+            unsimulated_text=self._unsimulated_rtl_reason,
+            unjudged_texts=self._unjudged_rtl_parts,
             path_text=path_text,
             trials=ReturnTrials(
                 (return_altitude, descend_altitude | return_altitude),
@@ -491,7 +493,7 @@ class Px4(Autopilot):
             ),
         )
 
-    def _unsimulated_returns(self, mission: ReturnMission) -> str:
+    def _unsimulated_rtl_reason(self, mission: ReturnMission) -> str:
         """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
 
         The reason "landing" means that the landing sequence begins with the landing itself.
@@ -499,14 +501,14 @@ class Px4(Autopilot):
         begins_with_landing = bool(mission.landings) and mission.landings[0].is_landing
         if begins_with_landing and self.parameters["RTL_TYPE"] in _TO_LANDING:
             return "landing"
-        return next(self._unsimulated_return_texts(mission.rally_distance), "")
+        return next(self._describe_unsimulated_rtl_type(mission.rally_distance), "")
 
-    def _unjudged_returns(self, mission: ReturnMission) -> tuple[str, ...]:
+    def _unjudged_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
         """Return texts on the parts of a mission's RTLs that are not simulated."""
         return_type, has_sequence = self.parameters["RTL_TYPE"], any(start.landing for start in mission.landings)
         is_unknown = return_type in _TO_LANDING and not has_sequence and not mission.commands.isdisjoint(LANDINGS)
         landing_text = f"RTL_TYPE {return_type:g} may return to a landing without DO_LAND_START, which is not simulated"
-        return (*([landing_text] if is_unknown else []), *self._unjudged_return_texts(mission.rally_distance))
+        return (*([landing_text] if is_unknown else []), *self._describe_unjudged_rtl_settings(mission.rally_distance))
 
     @property
     def loiters(self) -> LoiterRules:
@@ -565,7 +567,8 @@ def _transfer_state(previous_record: Record, record: Record, start: Floats) -> N
 
     The state of TECS and of the airspeed filter is kept.
 
-    previous_record, record: records of the control law before and after the change; the memory of the second is set.
+    previous_record, record: records of the control law before and after the change; the internal state in the second
+        is set.
     start: position, (3,) m.
     """
     record.memory = previous_record.memory

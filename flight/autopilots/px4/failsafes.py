@@ -2,7 +2,7 @@
 
 Read from PX4's sources and its parameter reference, not triggered: `Failsafe::checkStateAndMode` and
 `Failsafe::fromNavDllOrRclActParam` in `src/modules/commander/failsafe/failsafe.cpp`, `FailsafeBase::getSelectedAction`
-in `framework.cpp`.  Before it returns or lands, PX4 first holds its position in a loiter for COM_FAIL_ACT_T, which is
+in `framework.cpp`. Before it returns or lands, PX4 first holds its position in a loiter for COM_FAIL_ACT_T, which is
 not simulated.
 """
 
@@ -65,7 +65,10 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
 
 
 def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
-    """Return PX4's reaction to the loss of a radio link; for ``use`` see `link_loss_reactions`."""
+    """Return the loss of a radio link, with PX4's reaction; the reaction is "on" if PX4 ignores the loss.
+
+    use: "telemetry" for the ground station's link, "control" for the remote control.
+    """
     if use == "telemetry":
         name, parameter, exceptions = "station lost", "NAV_DLL_ACT", "COM_DLL_EXCEPT"
     else:

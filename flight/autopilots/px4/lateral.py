@@ -2,8 +2,9 @@
 
 NPFG is by Furieri, Stastny, Marconi, Siegwart and Gilitschenski, "Gone with the wind: Nonlinear guidance for small
 fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), extended to any path in Stastny's "On Flying
-Backwards" (2019), in PX4's form (`src/lib/npfg/`): a course that closes in on the track and turns along it, the heading
-that flies this course in the wind, and a lateral acceleration proportional to the heading error.
+Backwards" (2019). In PX4's form (`src/lib/npfg/`) it has three steps: a course that closes in on the track and turns
+along it, the heading with which the aircraft flies this course in the wind, and a lateral acceleration proportional to
+the heading error.
 
 A track is a path over the ground. Courses and headings are angles from the map's north, clockwise; a signed error is
 positive to the right.
@@ -103,7 +104,7 @@ def adapted_period(
     airspeed, wind_speed: m/s.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     """
-    # Without wind or curvature the period is that of a straight track.
+    # Without wind or curvature the period of a straight track applies.
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
     damping = parameters.npfg_damping
@@ -168,7 +169,9 @@ def heading_error_sine(air_east: float, air_north: float, reference_east: float,
 
 @inner
 def _look_ahead_angle(track_error: float, error_bound: float) -> float:
-    """Return the angle of the commanded bearing, rad: 0 at a right angle to the track, pi/2 along the track.
+    """Return the angle of the commanded bearing from the perpendicular to the track, rad.
+
+    It is 0 far from the track, where the bearing points to the track, and pi/2 on it, where the bearing leads along it.
 
     track_error: distance from the track, m.
     error_bound: result of `track_error_bound`, m.

@@ -1,4 +1,4 @@
-"""Simulate PX4's fixed-wing controllers in compiled code: navigation, guidance, TECS and attitude, and their memory.
+"""Simulate PX4's fixed-wing controllers in compiled code: navigation, guidance, TECS and attitude.
 
 Attitude control uses planfly's inner loops (`flight.guidance.inner_loops`) with the lags of PX4's controllers, whose
 gains are tuned to the aircraft and are not part of this model.
@@ -15,7 +15,7 @@ from flight.autopilots.px4.tecs import update_tecs
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
+from flight.guidance.path import find_on_path, pass_sharp_corners, profile_at
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -32,7 +32,7 @@ from flight.simulation.tick import (
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records, compiled, inner, record_dtype
 
-# Memory of PX4's controllers from tick to tick.
+# Internal state of PX4's controllers, kept from tick to tick.
 PX4_MEMORY = record_dtype(
     ("is_initialised", np.bool_),  # True once a tick was flown
     # Navigation.
@@ -70,7 +70,7 @@ PX4_MEMORY = record_dtype(
 PX4 = record_dtype(("memory", PX4_MEMORY), ("parameters", PX4_PARAMETERS))
 PX4_NUMBERS = PX4.itemsize // 8
 
-# Lag of the roll behind its setpoint, as a ratio to FW_R_TC.  From the overshoots of PX4's flights of the Aerosonde,
+# Lag of the roll behind its setpoint, as a ratio to FW_R_TC. From the overshoots of PX4's flights of the Aerosonde,
 # whose aileron feed-forward (FW_RR_FF) gives more than a roll rate needs.
 ROLL_LAG_RATIO = 0.65
 # Lag of the pitch behind its setpoint, as a ratio to FW_P_TC.
@@ -130,7 +130,7 @@ def px4_loop(
 
     The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
-    block: state, settings and path of the flight, the memory of a `flight.simulation.tick.Workspace`; updated.
+    block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.
     frames, numbers, code, contacts, frictions: arrays of a `flight.dynamics.compiled_model.CompiledModel`: state of the
         motion, registers, instructions, landing-gear contacts and scratch for their friction.
@@ -163,9 +163,9 @@ def control_as_px4(
     """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
 
     wind_east, wind_north: velocity of the air, m/s.
-    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record.
+    guidance: state of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     pieces, nodes: course and altitude profile of the reference path, arrays of a `FlyByPath`.
@@ -187,7 +187,7 @@ def control_as_px4(
     # Skip the rest of a loiter that PX4 left earlier than the path does, and do not end the mission early.
     while pieces[guidance.piece].leg < memory.leg - 1 and guidance.piece + 1 < pieces.shape[0]:
         guidance.piece += 1
-    leave_sharp_corners(pieces, guidance, memory.leg)
+    pass_sharp_corners(pieces, guidance, memory.leg)
     guidance.is_finished = guidance.is_finished and is_last_target(waypoints, memory)
     airspeed_setpoint = max(commanded_airspeed, memory.min_airspeed / airspeed_scale)
     guidance.speed_command = min(parameters.airspeed_max, airspeed_setpoint) * eas_to_tas
@@ -207,7 +207,7 @@ def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
     The limit is FW_PN_R_SLEW_MAX; 0 is no limit.
 
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     dt: duration of a tick, s.
     """
     max_roll_step = parameters.roll_slew_rate * dt
@@ -232,7 +232,7 @@ def _end_mission(
     last_waypoint: `WAYPOINT` record; at a loiter the flight is not ended here.
     guidance: `GUIDANCE_MEMORY` record, whose end of the flight is set.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    memory: internal state of the control law, a `PX4_MEMORY` record; updated.
     dt: duration of a tick, s.
     """
     has_arrived = (
@@ -265,7 +265,7 @@ def _initialise_memory(
     memory: Record,
     eas_to_tas: float,
 ) -> None:
-    """Initialise the control law's memory for steady flight at the first waypoint.
+    """Initialise the control law's internal state for steady flight at the first waypoint.
 
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
@@ -309,7 +309,7 @@ def _control_attitude(
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     gains: gains of the inner loops, a `GAINS` record.
-    guidance: memory of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
+    guidance: state of the inner loops and progress on the path, a `GUIDANCE_MEMORY` record; updated.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
     memory: `PX4_MEMORY` record with the setpoints.
     commands: `COMMANDS` record to fill.

@@ -1,19 +1,20 @@
 """Navigate as PX4 does: choose the waypoint to fly to, accept it, and set the altitude setpoint on a leg.
 
 Follows PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and
-`src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`).  A waypoint is reached within a radius of it or past the plane
-across the leg at it, and only within NAV_FW_ALT_RAD of its altitude; an aircraft that arrives too high or too low
-circles at the waypoint until it is within that tolerance.  The radius is NAV_ACC_RAD, and up to 1.16 guidance's own
-switch distance if that is more; an item's own radius (its second parameter) is not read for fixed wing.
+`src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`). A waypoint is reached within a radius of it, or past the plane
+through it across the leg, but only within NAV_FW_ALT_RAD of its altitude. An aircraft that arrives too high or too low
+circles at the waypoint until it is within that tolerance. The radius is NAV_ACC_RAD or, up to 1.16, the switch distance
+of the guidance if it is larger. PX4 ignores an item's own radius (its second parameter) for fixed wings.
 
-A loiter is flown around its center from the start of its leg (`control_auto_loiter`), which from a distance is straight
-to the center.  It is reached, once, within that radius of its rim and near its altitude; then its time runs, and it is
-left at once for the line from its center to the next waypoint.  Only if its item says so, it is left on the course to
-the next waypoint, or for a line that begins at the tangent point on the rim.  LOITER_TIME demands its altitude from the
-start; LOITER_TO_ALT demands the altitude at the start of its leg until the rim is reached, and its own from then on.
+From the start of a loiter's leg PX4 guides the aircraft onto the circle (`control_auto_loiter`): from a distance it
+flies straight to the center. The loiter is reached within that radius of its rim and near its altitude, and its time
+runs from then on. When the time is over, the aircraft at once joins the line from the center to the next waypoint. If
+the item says so, it leaves on the course to the next waypoint, or joins a line that begins at the tangent point on the
+rim. LOITER_TIME demands its altitude from the start; LOITER_TO_ALT demands the altitude at the start of its leg until
+the rim is reached, and its own altitude from then on.
 
-At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it.  A change of speed that the mission orders
-between them applies from where the aircraft crosses the plane through the gate.  Once the last waypoint is reached, PX4
+The aircraft does not fly to a gate (CONDITION_GATE), but to the waypoint after it. A change of speed between the two
+items takes effect where the aircraft crosses the plane through the gate. Once the last waypoint is reached, PX4
 circles with NAV_LOITER_RAD: about that waypoint, up to 1.16 about the aircraft's position at that time
 (`setEndOfMissionItems`).
 """
@@ -25,7 +26,7 @@ from world.geometry import wrap
 from world.kernels import Record, Records, inlined, inner
 
 # Delay from reaching a waypoint to the turn, s: the navigator's loop, its message to the position controller and the
-# controller's turn.  At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26.  PX4 1.17 and 1.18,
+# controller's turn. At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26. PX4 1.17 and 1.18,
 # which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a simulation without that
 # delay is never closer than 3 m.
 SWITCH_DELAY_S = 0.13
@@ -71,7 +72,7 @@ def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
     is False for a leg without length.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     """
     leg_east, leg_north = target.east - memory.from_east, target.north - memory.from_north
     distance_past = (estimated.east - target.east) * leg_east + (estimated.north - target.north) * leg_north
@@ -126,7 +127,7 @@ def find_target(waypoints: Records, memory: Record) -> int:
     """Return the index of the target: the next waypoint that is not a gate.
 
     waypoints: `WAYPOINT` records of the route, (w,).
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     """
     target_index: int = memory.leg + 1
     while waypoints[target_index].is_gate:
@@ -166,7 +167,7 @@ def _navigate_waypoint(
     estimated: position and velocity over the ground, a `MOTION` record.
     waypoints, target_index: `WAYPOINT` records of the route, (w,), and the index of the waypoint.
     wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
-    parameters, memory: PX4's parameters, and the control law's memory, which is updated.
+    parameters, memory: PX4's parameters, and the control law's internal state, which is updated.
     dt: duration of a tick, s.
     """
     target = waypoints[target_index]
@@ -228,7 +229,7 @@ def _navigate_loiter(
     estimated: position and velocity over the ground, a `MOTION` record.
     waypoints, loiter: `WAYPOINT` records of the route, (w,), and the one on the loiter.
     wind_east, wind_north, target_airspeed: velocity of the air and airspeed to fly at, m/s.
-    parameters, memory: PX4's parameters, and the control law's memory, which is updated.
+    parameters, memory: PX4's parameters, and the control law's internal state, which is updated.
     dt: duration of a tick, s.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -283,7 +284,7 @@ def is_last_target(waypoints: Records, memory: Record) -> bool:
     """Return True if the target is the last target of the route; waypoints on one loiter are one target.
 
     waypoints: `WAYPOINT` records of the route, (w,).
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     """
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
@@ -320,7 +321,7 @@ def climb_before_return(
     wind_east, wind_north: velocity of the air, m/s.
     target_airspeed: m/s.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    memory: internal state of the control law, a `PX4_MEMORY` record; updated.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.is_loitering = True, False
@@ -368,7 +369,7 @@ def _navigate_rtl(
     wind_east, wind_north: velocity of the air, m/s.
     target_airspeed: m/s.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    memory: internal state of the control law, a `PX4_MEMORY` record; updated.
     """
     # The target is RTL_DESCEND_ALT above the destination, but no higher than the return altitude.
     lowest_return_altitude = rtl.up + max(0.0, parameters.rtl_altitude - parameters.rtl_descend_altitude)
@@ -405,7 +406,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).
     leg: index of the leg's first waypoint.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    memory: internal state of the control law, a `PX4_MEMORY` record; updated.
     """
     start, end = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -450,7 +451,7 @@ def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance
     end.
 
     end_east, end_north, end_up: end of the leg, m.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     """
     leg_length = math.hypot(end_east - memory.from_east, end_north - memory.from_north)
     min_distance = min(memory.min_distance_to_end, leg_length)

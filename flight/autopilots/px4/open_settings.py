@@ -32,7 +32,7 @@ _TORQUE_BY_PART = {"ailerons": "TRQ_R", "elevator": "TRQ_P"}
 _FIXED_WING = 1.0
 # First and last output function of each part.
 _OUTPUT_FUNCTIONS_BY_PART = {"motor": (101.0, 112.0), "surface": (201.0, 208.0)}
-# ArduPlane's gains of an aircraft that PX4 has under another name.  ArduPlane's give degrees, of 45, per degree a
+# ArduPlane's gains of an aircraft that PX4 has under another name. ArduPlane's give degrees, of 45, per degree a
 # second, PX4's fractions of the throw per radian a second; both apply at cruise speed.
 _GAIN_NAMES = {
     "RLL_RATE_FF": "FW_RR_FF",

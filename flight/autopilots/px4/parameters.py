@@ -1,9 +1,9 @@
 """Define PX4's parameters for fixed-wing missions, in SI units and radians.
 
 Names, units, ranges and defaults are from PX4's parameter reference (docs.px4.io, v1.16 and v1.17) and the `*_params.c`
-files next to the modules that read them.  PX4 itself enforces no range: a value outside the documented range is
-accepted and reported if it can be flown (FW_R_LIM is documented from 35 degrees, and 30 is flown).  A parameter is
-taken from the first source that states it: the user's file, the aircraft, PX4's defaults.  An aircraft's folder
+files next to the modules that read them. PX4 itself enforces no range: a value outside the documented range is
+accepted and reported if it can be flown (FW_R_LIM is documented from 35 degrees, and 30 is flown). A parameter is
+taken from the first source that states it: the user's file, the aircraft, PX4's defaults. An aircraft's folder
 describes the aircraft once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in
 PX4.
 """

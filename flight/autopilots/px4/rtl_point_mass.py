@@ -1,12 +1,12 @@
 """Simulate PX4's RTL with a point mass in some milliseconds.
 
-The control law is the compiled code of the simulated PX4: its navigator, NPFG and TECS.  It controls a
+The control law is the compiled code of the simulated PX4: its navigator, NPFG and TECS. It controls a
 `flight.autopilots.point_mass.PointMass`, whose bank and pitch follow their setpoints with the lags of PX4's
 controllers.
 
 An RTL goes to a loiter over home or a rally point (PX4's `src/modules/navigator/rtl_direct.cpp`), or to the landing
-sequence of the mission (`rtl_direct_mission_land.cpp`).  On the way to the sequence the aircraft climbs first as in any
-RTL; then it flies the items of the sequence, loiters to an altitude as loiters and all others as plain waypoints.  Such
+sequence of the mission (`rtl_direct_mission_land.cpp`). On the way to the sequence the aircraft climbs first as in any
+RTL; then it flies the items of the sequence, loiters to an altitude as loiters and all others as plain waypoints. Such
 an RTL is simulated up to the last item before the landing.
 """
 
@@ -45,7 +45,7 @@ from flight.autopilots.simulated_returns import (
 )
 from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.guidance.lateral_reference_laws import waypoint_column
+from flight.guidance.lateral_reference_laws import strided_waypoints
 from flight.guidance.navigation_error import MOTION
 from flight.mission.return_path import ReturnTarget
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII
@@ -134,7 +134,7 @@ def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) 
     A landing sequence consists of its stops and the landing.
     """
     stops = () if target.landing is None else (target.landing, *target.landing.next_stops)
-    route = waypoint_column(2 if target.landing is None else len(stops) + 2)
+    route = strided_waypoints(2 if target.landing is None else len(stops) + 2)
     route["airspeed"], route["stop"] = parameters["FW_AIRSPD_TRIM"], np.arange(len(route))
     route[0].east, route[0].north, route[0].up = start["east"], start["north"], start["up"]
     last_waypoint = route[-1]
@@ -244,7 +244,9 @@ def fly_rtl(
         if result.outcome != RETURN_TIMEOUT:
             break
         state.pitch = pitch
-        has_begun = _steer(state, estimated, waypoints, transit_altitude, parameters, memory, lands, has_begun, dt)
+        has_begun = _update_setpoints(
+            state, estimated, waypoints, transit_altitude, parameters, memory, lands, has_begun, dt
+        )
         pitch, path_angle = _follow_setpoints(state, parameters, memory, aircraft, pitch, path_angle, dt)
         throttle = memory.throttle_setpoint
         energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, field, dt)
@@ -256,7 +258,7 @@ def fly_rtl(
 
 
 @inner
-def _steer(
+def _update_setpoints(
     state: Record,
     estimated: Record,
     waypoints: Records,
@@ -350,7 +352,7 @@ def _initialise_memory(
     state: Record,
     memory: Record,
 ) -> None:
-    """Set the state of the point mass, and the control law's memory as after a long steady flight.
+    """Set the state of the point mass, and the law's internal state as after a long steady flight.
 
     The steady flight may be a climb, in which the altitude reference is ahead of the aircraft by the lag of TECS.
 

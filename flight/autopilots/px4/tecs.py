@@ -1,7 +1,7 @@
 """Implement PX4's TECS, with throttle from the STE rate and pitch from the balance of altitude and speed (SEB rate).
 
-Follows PX4's `src/lib/tecs/TECS.cpp` and its parameter reference (FW_T_*).  The Total Energy Control System is by
-Lambregts (AIAA 83-2239).  Energies are per kilogram, their rates m^2/s^3.  Speeds are true airspeeds.
+Follows PX4's `src/lib/tecs/TECS.cpp` and its parameter reference (FW_T_*). The Total Energy Control System is by
+Lambregts (AIAA 83-2239). Energies are per kilogram, their rates m^2/s^3. Speeds are true airspeeds.
 """
 
 import math
@@ -13,7 +13,7 @@ from world.kernels import Record, inner
 _SPEED_RATE_FRACTION = 0.5
 # Maximum rate of the airspeed setpoint, m/s^2.
 _AIRSPEED_SLEW_MPS2 = 1.0
-# Airspeed difference below FW_AIRSPD_MIN at which underspeed begins, as a fraction of FW_AIRSPD_TRIM.  The underspeed
+# Airspeed difference below FW_AIRSPD_MIN at which underspeed begins, as a fraction of FW_AIRSPD_TRIM. The underspeed
 # ratio rises from 0 to 1 over the same difference below that airspeed.
 _UNDERSPEED_FRACTION = 0.15
 
@@ -22,11 +22,11 @@ _UNDERSPEED_FRACTION = 0.15
 def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> None:
     """Move the altitude reference towards the altitude setpoint (`TECSAltitudeReferenceModel`).
 
-    The reference climbs at most at FW_T_CLMB_R_SP and sinks at most at FW_T_SINK_R_SP.  It decelerates at
+    The reference climbs at most at FW_T_CLMB_R_SP and sinks at most at FW_T_SINK_R_SP. It decelerates at
     FW_T_VERT_ACC, early enough not to overshoot the setpoint.
 
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     dt: duration of a tick, s.
     """
     altitude_error = memory.altitude_setpoint - memory.altitude_reference
@@ -77,7 +77,7 @@ def update_tecs(
 
     The throttle controls the total energy, the pitch its distribution between altitude and airspeed.
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
-    `_calcAirspeedControlOutput`.  The setpoint of the SKE rate follows from the airspeed setpoint
+    `_calcAirspeedControlOutput`. The setpoint of the SKE rate follows from the airspeed setpoint
     (`_calcSpecificEnergyRates`).
 
     state: a record of `flight.dynamics.state.STATE`.
@@ -85,7 +85,7 @@ def update_tecs(
     airspeed_setpoint: equivalent airspeed, m/s.
     eas_to_tas: ratio of true to equivalent airspeed.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     dt: duration of a tick, s.
     """
     update_altitude_reference(parameters, memory, dt)
@@ -159,7 +159,7 @@ def _calc_pitch_control(
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record; updated.
+    memory: internal state of the control law, a `PX4_MEMORY` record; updated.
     altitude_rate_setpoint: m/s.
     ske_rate_setpoint: rate of the specific kinetic energy, m^2/s^3.
     underspeed_ratio: 0 in normal flight to 1 in full underspeed, in which the pitch controls only the airspeed.
@@ -215,7 +215,7 @@ def _calc_throttle_control(
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     parameters: PX4's parameters, a `PX4_PARAMETERS` record.
-    memory: memory of the control law between ticks, a `PX4_MEMORY` record.
+    memory: internal state of the control law, a `PX4_MEMORY` record.
     dt: duration of a tick, s.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate

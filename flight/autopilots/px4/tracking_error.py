@@ -1,7 +1,7 @@
 """Compute PX4's deviation from the legs of a plan by simulating horizontal turns with its own guidance.
 
 Each turn is simulated in still air, at a constant ground speed, with `flight.autopilots.px4.navigator` and the lag of
-the roll.  For wind, the excursion in still air at the highest ground speed on the leg is increased by `WIND_SPREAD`.
+the roll. For wind, the excursion in still air at the highest ground speed on the leg is increased by `WIND_SPREAD`.
 """
 
 import math
@@ -15,7 +15,7 @@ from flight.autopilots.px4.lateral import roll_setpoint
 from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG_RATIO
 from flight.autopilots.px4.navigator import acceptance_radius_at, navigate
 from flight.autopilots.px4.parameters import Px4Parameters
-from flight.guidance.lateral_reference_laws import waypoint_column
+from flight.guidance.lateral_reference_laws import strided_waypoints
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.arrays import Floats
 from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
@@ -36,7 +36,7 @@ _TIMEOUT_S = 120.0
 _RUN_IN_M = 200.0
 # Time step of the simulations, s.
 _TIME_STEP_S = 0.05
-# Margin for wind: factor on the excursion in still air, and addition to that factor for a turn of 90 degrees.  Measured
+# Margin for wind: factor on the excursion in still air, and addition to that factor for a turn of 90 degrees. Measured
 # on ArduPlane's turns in wind (`flight.autopilots.arduplane.tracking_error`), whose guidance does not use the wind as
 # PX4's does.
 WIND_SPREAD = 1.1, 0.5
@@ -46,13 +46,13 @@ _NAVIGATION_SIGMAS = 3.0
 _CROSS_TRACK_M = 2.0
 # Deviation from the lagged altitude in light turbulence, without navigation errors, m.
 _ALTITUDE_ERROR_M = 3.0
-# Fraction of FW_T_CLMB_R_SP and FW_T_SINK_R_SP that a plan uses, by turbulence.  PX4 flies slopes steeper than planned,
+# Fraction of FW_T_CLMB_R_SP and FW_T_SINK_R_SP that a plan uses, by turbulence. PX4 flies slopes steeper than planned,
 # because they end a loiter radius early, and it circles if the altitude is not reached at a waypoint.
 _RATE_FRACTIONS = {"none": 0.8, "light": 0.7, "moderate": 0.6}
 # The same fraction of the aircraft's own climb and sink rates: a gust that lasts as long as a leg reduces them, and PX4
-# circles if it reaches a waypoint more than NAV_FW_ALT_RAD from its altitude.  In light turbulence the Zagi's slopes
+# circles if it reaches a waypoint more than NAV_FW_ALT_RAD from its altitude. In light turbulence the Zagi's slopes
 # over 4 km at 0.9 of its rates ended in circles in 2 (up) and 6 (down) of 6 streams, at 0.6 (0.7 less the margin of
-# plans) in none and 1.  In still air it flew 0.98 of them within 6 m: no margin is needed there.
+# plans) in none and 1. In still air it flew 0.98 of them within 6 m: no margin is needed there.
 _OWN_RATE_FRACTIONS = _RATE_FRACTIONS | {"none": 1.0}
 
 # Standard deviation of the altitude in moderate turbulence with sufficient climb and sink rates, m: 3.7 computed from
@@ -144,7 +144,7 @@ def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, 
     greatest distance from the legs, includes the margin for wind.
     """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
-    _measure_corners(parameters.record(), airspeed, TURNS, SPEED_RATIOS * airspeed, corners, waypoint_column(3))
+    _measure_corners(parameters.record(), airspeed, TURNS, SPEED_RATIOS * airspeed, corners, strided_waypoints(3))
     excursion_factor, right_angle_margin = WIND_SPREAD
     corners["excursion"] *= (excursion_factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.

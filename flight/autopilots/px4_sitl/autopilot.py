@@ -15,7 +15,7 @@ from flight.simulation.setup import FlightSetup
 
 @dataclass(frozen=True)
 class Px4Sitl(ProgramAutopilot, Px4):
-    """PX4 itself.  Before the flight, the simulated PX4 stands in for the program."""
+    """PX4 itself. Before the flight, the simulated PX4 stands in for the program."""
 
     log_suffix: ClassVar = ".ulg"
 

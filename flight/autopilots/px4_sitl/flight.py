@@ -60,7 +60,7 @@ class Px4Flight(SitlFlight):
             self._link = link
             launch = px4_launch(binary, flight_parameters.values, port.port, link.program_port, link.port)
             process = stack.enter_context(AutopilotProcess(binary, launch))
-            self._process, port.watch = process, process.watch
+            self._process, port.check_program = process, process.check_running
             lockstep = HilLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._lockstep = lockstep
             self._preflight = Px4Preflight(link, lambda: lockstep.time)
@@ -69,7 +69,7 @@ class Px4Flight(SitlFlight):
             # The output shows when PX4's start-up script has ended.
             lockstep.boot(
                 self._rail,
-                lambda: any(STARTED in line for line in process.lines()),
+                lambda: any(STARTED in line for line in process.output_lines()),
                 _STALL_TIME_S,
                 _STARTUP_TIMEOUT_S,
             )

@@ -1,7 +1,7 @@
 """Implement PX4's simulator link in lockstep, with sensor messages, socket and exchange.
 
-PX4 connects to the simulator by TCP with MAVLink.  Each HIL_SENSOR sets PX4's clock and triggers a step of PX4, which
-answers each step with one HIL_ACTUATOR_CONTROLS once its outputs run.  Follows PX4's
+PX4 connects to the simulator by TCP with MAVLink. Each HIL_SENSOR sets PX4's clock and triggers a step of PX4, which
+answers each step with one HIL_ACTUATOR_CONTROLS once its outputs run. Follows PX4's
 `src/modules/simulation/simulator_mavlink/SimulatorMavlink.cpp` and docs.px4.io, "Simulator MAVLink API".
 """
 
@@ -44,7 +44,7 @@ _FIX_3D = 3
 _SATELLITE_COUNT = 12
 # Stated accuracy of the GNSS position, m; the position is exact except for the error of the flight's navigation.
 _GNSS_ACCURACY_M = 0.9
-# PX4 treats a sensor whose value never changes as broken, and on the rail no value changes.  So noise of a little more
+# PX4 treats a sensor whose value never changes as broken, and on the rail no value changes. So noise of a little more
 # than PX4's quantum is added, the same in each flight: to the magnetic field ...
 _FIELD_NOISE_GAUSS = 2e-4
 # ... the specific force ...
@@ -56,7 +56,9 @@ _PRESSURE_NOISE_HPA = 5e-3
 
 
 def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
-    """Return the Earth's magnetic field (north, east, down), gauss, from pymavlink's tables.
+    """Return the Earth's magnetic field (north, east, down) at a position, gauss, from pymavlink's tables.
+
+    lat_deg, lon_deg: degrees.
 
     >>> north, east, down = earth_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
@@ -160,7 +162,7 @@ class SimulatorPort:
     """Socket to which PX4 connects.
 
     port: number of the port.
-    watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
+    check_program: function that is called while nothing arrives; it raises FlightError if the program has ended.
     """
 
     def __init__(self) -> None:
@@ -168,7 +170,7 @@ class SimulatorPort:
         self._listener.bind((LOOPBACK, 0))
         self._listener.listen(1)
         self.port = int(self._listener.getsockname()[1])
-        self.watch: Callable[[], None] = lambda: None
+        self.check_program: Callable[[], None] = lambda: None
         self._stream: socket.socket | None = None
         self._mav = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._mav.robust_parsing = True
@@ -196,7 +198,7 @@ class SimulatorPort:
             try:
                 self._stream, _ = self._listener.accept()
             except TimeoutError:
-                self.watch()
+                self.check_program()
                 if self._clock() - start > timeout:
                     message = f"did not connect to the simulator within {timeout:.0f} s"
                     raise FlightError(message, field="simulator") from None
@@ -204,7 +206,7 @@ class SimulatorPort:
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def pack(self, *messages: Any) -> bytes:
-        """Return the bytes of some messages, for `send`."""
+        """Return the bytes of some messages, which `send` accepts."""
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
@@ -231,7 +233,7 @@ class SimulatorPort:
             start = self._clock()
             while not self._answers:
                 if not self._receive_data(timeout):
-                    self.watch()
+                    self.check_program()
                     if timeout <= _CHECK_INTERVAL_S or self._clock() - start > timeout:
                         return None
         return self._answers.pop(0)
@@ -251,7 +253,7 @@ class SimulatorPort:
 
         The actuator outputs in the data are appended to `_answers`.
 
-        A single call waits at most `_CHECK_INTERVAL_S`.  Raises ValueError before PX4 has connected.
+        A single call waits at most `_CHECK_INTERVAL_S`. Raises ValueError before PX4 has connected.
         """
         if self._stream is None:
             raise ValueError("PX4 has not connected")
@@ -294,7 +296,9 @@ _EARLY_ANSWER_TIMEOUT_S = 0.01
 
 
 class HilLockstep(Lockstep):
-    """Exchange over a `SimulatorPort`, with two steps of PX4, which samples its sensors at 250 Hz, in each frame.
+    """Exchange over a `SimulatorPort` that runs two steps of PX4 in each frame.
+
+    PX4 samples its sensors at 250 Hz, about twice the frame rate.
 
     port: socket to which PX4 connects.
     servos: servos of the controls; PX4's outputs of -1..1 (throttle 0..1) are fractions of their throw.
@@ -342,10 +346,11 @@ class HilLockstep(Lockstep):
         self._awaits_answer = True
 
     def boot(self, rail: RailEnd, has_started: Callable[[], bool], stall_time: float, startup_timeout: float) -> None:
-        """Wait until PX4's start-up script has ended.
+        """Run PX4 with the aircraft at rest until PX4's start-up script has ended.
 
         Meanwhile PX4 gets a step only when it waits for one.
 
+        rail: rail at whose start the aircraft stands.
         has_started: function that returns True once the script has ended.
         stall_time: time without an answer after which PX4 waits for a step, s by the clock.
         startup_timeout: s by the clock.
@@ -358,10 +363,10 @@ class HilLockstep(Lockstep):
             if clock() - start > startup_timeout:
                 raise FlightError(f"did not start up within {startup_timeout:.0f} s", field="start-up")
             if self._port.receive_answer(stall_time) is None:
-                self.hold(rail)
+                self.step_on_rail(rail)
 
-    def _receive_commands(self) -> Commands:
-        """Return the commands in the last outputs of PX4."""
+    def _next_commands(self) -> Commands:
+        """Return the commands in PX4's answer to the first step of the last frame, without waiting."""
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.value_at_fraction(outputs[ELEVATOR]),
@@ -371,7 +376,11 @@ class HilLockstep(Lockstep):
         )
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
-        """Run two steps of PX4: with the motion halfway from the last frame to this one, and with this motion."""
+        """Run two steps of PX4: with the motion halfway from the last frame to this one, and with this motion.
+
+        motion: numbers of a `BodyMotion`.
+        battery: not used.
+        """
         current = BodyMotion(*motion)
         previous = self._last_motion or current._replace(time=current.time - 1.0 / FRAME_HZ)
         self._last_motion = current

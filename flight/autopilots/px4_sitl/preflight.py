@@ -55,8 +55,8 @@ class Px4Preflight(Conversation):
         yield from self._upload(number_from_zero(mission.items), MissionType.MISSION)
         if mission.rally:
             yield from self._upload(list(mission.rally), MissionType.RALLY)
-        yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
-        yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_MANUAL, 0), "MANUAL")
+        yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._send_home(mission.home), "home")
+        yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._send_mode(_MANUAL, 0), "MANUAL")
         yield from self._send_until_accepted(
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
             lambda: self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1),
@@ -64,8 +64,8 @@ class Px4Preflight(Conversation):
         )
 
     def start_mission(self) -> ConversationStep:
-        """Switch PX4 to mission mode.  Raises FlightError if PX4 refuses."""
-        yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
+        """Switch PX4 to mission mode. Raises FlightError if PX4 refuses."""
+        yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._send_mode(_AUTO, _MISSION), "MISSION")
         mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "was not armed and in mission mode")
         yield from self._wait_until(lambda: self._reported.mode == MISSION_MODE and self._reported.armed, mission_mode)
 
@@ -81,8 +81,8 @@ class Px4Preflight(Conversation):
         """Disarm PX4, which closes its log."""
         self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
-    def _set_mode(self, main_mode: int, sub_mode: int) -> None:
-        """Command a mode of PX4."""
+    def _send_mode(self, main_mode: int, sub_mode: int) -> None:
+        """Send the command for a flight mode, by PX4's numbers of the main mode and the sub-mode."""
         self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main_mode, sub_mode)
 
 

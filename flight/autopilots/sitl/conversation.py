@@ -1,6 +1,6 @@
 """Exchange MAVLink messages with a SITL autopilot before the flight, while the aircraft is held on its rail.
 
-Each step of the conversation is a generator.  When it is resumed, the autopilot's time has advanced, and the link has
+Each step of the conversation is a generator. When it is resumed, the autopilot's time has advanced, and the link has
 processed the messages that arrived in between.
 """
 
@@ -90,10 +90,10 @@ class Conversation:
         self._link, self._now, self._clock = link, now, clock
         self._reported = link.reported
 
-    def _identify(self, kind: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> ConversationStep:
+    def _identify(self, title: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> ConversationStep:
         """Wait for the autopilot's heartbeat, request periodic messages, and read parameters.
 
-        kind: name of the expected autopilot.
+        title: name of the expected autopilot.
         message_intervals: interval of each requested message by its number, microseconds.
         parameters: names of the parameters to read; parameters that the autopilot does not have are skipped.
 
@@ -104,7 +104,7 @@ class Conversation:
         yield from self._wait_until(lambda: reported.vehicle is not None, awaited, self._send_heartbeat)
         if reported.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
-                f"is not {kind}: its heartbeat states vehicle type {reported.vehicle}; expected 1, a fixed wing",
+                f"is not {title}: its heartbeat states vehicle type {reported.vehicle}; expected 1, a fixed wing",
                 field="vehicle type",
                 value=reported.vehicle,
                 allowed="expected 1, a fixed wing",
@@ -124,7 +124,7 @@ class Conversation:
                 yield
 
     def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> ConversationStep:
-        """Wait until the autopilot's estimator has a position.  Raises FlightError after a timeout.
+        """Wait until the autopilot's estimator has a position. Raises FlightError after a timeout.
 
         message, interval: number of the message that reports the estimator's state, and its interval, microseconds.
         excluding_flags: flags that must not be set, because the estimator then has no position.
@@ -139,9 +139,13 @@ class Conversation:
     def _wait_until(
         self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
     ) -> ConversationStep:
-        """Wait until a condition is true, and repeat a request every second.
+        """Wait until a condition is true, and meanwhile repeat a request every second.
 
-        Raises FlightError after a timeout.
+        is_done: function that returns True once the condition is true.
+        awaited: description of the condition, for the error, and its timeout.
+        request: function that sends the request; None to wait only.
+
+        Raises FlightError after the timeout.
         """
         stopwatch, last_request = self._start_stopwatch(), None
         while not is_done():
@@ -174,8 +178,8 @@ class Conversation:
         numbers = [float(value) for value in (*params, *(0.0,) * (7 - len(params)))]
         self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
 
-    def _set_home(self, home: Home) -> None:
-        """Send home as a command."""
+    def _send_home(self, home: Home) -> None:
+        """Send the command that sets home."""
         item = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
         self._link.send(
             mavlink.MAVLink_command_int_message(
@@ -211,19 +215,19 @@ class Conversation:
             request,
         )
 
-    def _upload(self, items: list[MissionItem], kind: MissionType) -> ConversationStep:
+    def _upload(self, items: list[MissionItem], mission_type: MissionType) -> ConversationStep:
         """Upload a mission or rally points (MAVLink mission protocol).
 
-        Retry for up to `UPLOAD_TIMEOUT_S` while the autopilot reports that it has no space.  Raises FlightError if the
+        Retry for up to `UPLOAD_TIMEOUT_S` while the autopilot reports that it has no space. Raises FlightError if the
         autopilot refuses the items or does not answer.
         """
         stopwatch = self._start_stopwatch()
-        list_name = "mission" if kind == MissionType.MISSION else "rally points"
+        list_name = "mission" if mission_type == MissionType.MISSION else "rally points"
         while True:
             # Send the number of items and each item that is requested, until an acknowledgment or a timeout.
             reported, link = self._reported, self._link
             reported.requested = reported.mission_result = None
-            link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
+            link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), mission_type))
             last_item, item_stopwatch = None, self._start_stopwatch()
             while reported.mission_result is None and not item_stopwatch.has_passed(REPLY_TIMEOUT_S):
                 if reported.requested is not None and (

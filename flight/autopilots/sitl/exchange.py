@@ -60,7 +60,6 @@ def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -
     lat, lon: the position, rad.
     from_lat, from_lon: the position from which the offset is measured, rad.
 
-
     >>> north, east = offset_on_sphere(math.radians(36.01), -1.5, math.radians(36.0), -1.5)
     >>> round(north, 3), east
     (1113.188, 0.0)
@@ -88,9 +87,9 @@ def position_on_sphere(north: float, east: float, from_lat: float, from_lon: flo
 # ----------------------------------------------------------------------
 # The rail on which an autopilot's flight starts: a rail in the air, or the rail of a launch.
 #
-# The autopilot's estimator has to settle with the aircraft at rest.  The aircraft therefore stands on a level rail, at
-# the attitude of trimmed flight, until the autopilot is ready.  Then the aircraft is accelerated along the rail to the
-# speed of trimmed flight, and released.  For a take-off the rail is the catapult or the throwing hand, with its incline
+# The autopilot's estimator has to settle with the aircraft at rest. The aircraft therefore stands on a level rail, at
+# the attitude of trimmed flight, until the autopilot is ready. Then the aircraft is accelerated along the rail to the
+# speed of trimmed flight, and released. For a take-off the rail is the catapult or the throwing hand, with its incline
 # and acceleration; on a runway the aircraft stands at the start of its take-off run.
 
 # Acceleration along the rail, m/s^2.
@@ -258,8 +257,8 @@ class Lockstep(ABC):
         return self._frame / FRAME_HZ
 
     @abstractmethod
-    def _receive_commands(self) -> Commands:
-        """Wait for the commands of the next frame.
+    def _next_commands(self) -> Commands:
+        """Return the commands of the autopilot for the next frame; wait for them if necessary.
 
         Raises FlightError if the program ends or stops answering.
         """
@@ -272,10 +271,10 @@ class Lockstep(ABC):
         battery: volts and amperes; None for an aircraft without a battery.
         """
 
-    def hold(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
+    def step_on_rail(self, rail: RailEnd, time_since_launch: float = 0.0) -> None:
         """Run one frame with the aircraft on the rail, ``time_since_launch`` s after the acceleration began."""
-        self._workspace.commands[:] = self._receive_commands()
-        motion = motion_on_rail(rail, self._next_time(), time_since_launch, self._home)
+        self._workspace.commands[:] = self._next_commands()
+        motion = motion_on_rail(rail, self._start_frame(), time_since_launch, self._home)
         north, east, up, velocity_north, velocity_east, velocity_up = self.error
         self._send_motion(
             motion._replace(
@@ -301,7 +300,7 @@ class Lockstep(ABC):
         current, current_factor = self._current
         self._send_motion(
             (
-                *(self._next_time(), p, q, r, *self._fdm.specific_force()),
+                *(self._start_frame(), p, q, r, *self._fdm.specific_force()),
                 *(north + error_north, east + error_east, home_amsl - amsl - error_up),
                 *(
                     roll,
@@ -328,7 +327,7 @@ class Lockstep(ABC):
         """
         workspace = self._workspace
         fdm = self._fdm
-        receive_commands = self._receive_commands
+        next_commands = self._next_commands
         step = self.step
         getters = [self._access.getters[field] for field in READ_FIELDS]
         pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
@@ -341,7 +340,7 @@ class Lockstep(ABC):
             for _ in range(count):
                 # Read while the autopilot computes its answer, which does not depend on these values.
                 pack(readings, 0, *[getter() for getter in getters])
-                commands = receive_commands()
+                commands = next_commands()
                 pack_commands(commands_array, 0, *commands)
                 if status := tick():
                     return status
@@ -355,19 +354,22 @@ class Lockstep(ABC):
                 fdm.write(commands)
                 step()
                 for _ in range(steps - 1):
-                    fdm.write(receive_commands())
+                    fdm.write(next_commands())
                     step()
             return 0
 
         return fly
 
-    def serve(self) -> None:
-        """Run one more frame at the end of a flight: apply the autopilot's commands, and send the motion to it."""
-        self._fdm.write(self._receive_commands())
+    def answer_frame(self) -> None:
+        """Answer one more frame of a program that is ending: apply its commands, and send the motion to it."""
+        self._fdm.write(self._next_commands())
         self.step()
 
-    def _next_time(self) -> float:
-        """Start the next frame: poll the MAVLink connection if due, and return the time of the exchange, s."""
+    def _start_frame(self) -> float:
+        """Start the next frame, and return its time since the start of the exchange, s.
+
+        The MAVLink connection is polled in every `POLL_INTERVAL_FRAMES`th frame.
+        """
         self._frame += 1
         if self._frame % POLL_INTERVAL_FRAMES == 0:
             self._poll()

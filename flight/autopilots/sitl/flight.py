@@ -32,7 +32,14 @@ from flight.guidance.path import profile_at, project
 from flight.mission.ground_phases import TakeOff
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S, Ground, Release, default_gear, find_release, release
+from flight.simulation.simulate import (
+    GROUND_TIME_ALLOWANCE_S,
+    Ground,
+    Release,
+    default_gear,
+    find_release,
+    release_aircraft,
+)
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -176,8 +183,8 @@ def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, f
 
 # Minimum distance from the release to the first waypoint, m.
 MIN_RUN_IN_DISTANCE_M = 500.0
-# Minimum time from the release to the first waypoint, s.  After the release the aircraft rises by 4 m and then sinks by
-# 6 m, because TECS integrated errors on the rail.  In the stored flights the altitude error was up to 2.2 m 20 s after
+# Minimum time from the release to the first waypoint, s. After the release the aircraft rises by 4 m and then sinks by
+# 6 m, because TECS integrated errors on the rail. In the stored flights the altitude error was up to 2.2 m 20 s after
 # the release, more at higher altitudes and in stronger winds, and the flights agreed with the simulated control law to
 # 0.5 m 5 s later.
 MIN_RUN_IN_TIME_S = 40.0
@@ -214,9 +221,9 @@ class SitlFlight(ProgramFlight):
     binary: file of the program.
 
     A flight that starts in the air stands on a rail until the autopilot is ready, then flies at least
-    `MIN_RUN_IN_DISTANCE_M` straight and level in the mean wind.  The track and the turbulence begin where the aircraft
-    passes the first waypoint, as in planfly's own flights.  The track of a flight from the ground begins at the end of
-    the launch, or at rest on the runway, and its mission is uploaded unchanged.  The GNSS position has the error of the
+    `MIN_RUN_IN_DISTANCE_M` straight and level in the mean wind. The track and the turbulence begin where the aircraft
+    passes the first waypoint, as in planfly's own flights. The track of a flight from the ground begins at the end of
+    the launch, or at rest on the runway, and its mission is uploaded unchanged. The GNSS position has the error of the
     setup's navigation.
 
     Raises FlightError, in one line that names the program, if the program does not start, uses another version of the
@@ -325,20 +332,20 @@ class SitlFlight(ProgramFlight):
                 # The simulated motion starts at the end of the launch, or at rest on the runway.
                 self._set_unit_factors()
                 commands = tuple(float(command) for command in self._workspace.commands)
-                self._work.commands = release(
+                self._work.commands = release_aircraft(
                     self.fdm, self._release, (commands[0], commands[1], commands[2], commands[3])
                 )
                 self._work.air.wind_north, self._work.air.wind_east = self._release.wind[:2]
                 self._make_loop(self._ground_tick)
 
     def _push(self, start_fraction: float = 0.0, end_fraction: float = 1.0) -> None:
-        """Accelerate the aircraft along the rail from one fraction of the push time to another."""
+        """Accelerate the aircraft along the rail from one fraction of the push time to another, each 0 to 1."""
         frames = math.ceil(self._rail.push_time * FRAME_HZ)
         for k in range(math.ceil(start_fraction * frames) + 1, math.ceil(end_fraction * frames) + 1):
-            self._lockstep.hold(self._rail, k / FRAME_HZ)
+            self._lockstep.step_on_rail(self._rail, k / FRAME_HZ)
 
     def save_log(self, target: Path) -> bool:
-        """End the program cleanly and move its log to a file; return True if there was a log."""
+        """End the program cleanly and move its log to the file ``target``; return True if there was a log."""
         self._process.end(self._answer_frame)
         return self._process.save_log(target)
 
@@ -355,7 +362,7 @@ class SitlFlight(ProgramFlight):
         """Hold the aircraft at rest on the rail during a step of the conversation with the program."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
-                self._lockstep.hold(self._rail)
+                self._lockstep.step_on_rail(self._rail)
             try:
                 next(step)
             except StopIteration:
@@ -408,7 +415,7 @@ class SitlFlight(ProgramFlight):
     def _answer_frame(self) -> bool:
         """Answer one more frame of a program that is about to end; return False if the program has ended."""
         try:
-            self._lockstep.serve()
+            self._lockstep.answer_frame()
         except FlightError:
             return False
         return True

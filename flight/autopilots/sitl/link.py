@@ -150,7 +150,10 @@ class TcpLink(AutopilotLink):
             self._stream = None
 
     def _receive(self) -> bytes:
-        """Return the bytes that have arrived on the TCP connection; accept the connection first."""
+        """Return the bytes that have arrived on the TCP connection; b"" if none have arrived.
+
+        If the program is not yet connected, its connection is accepted first.
+        """
         if self._stream is None:
             try:
                 self._stream, _ = self._listener.accept()

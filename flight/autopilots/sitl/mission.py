@@ -1,10 +1,10 @@
 """Build the mission that an autopilot gets to fly, from the items of the route and one extra waypoint.
 
-Items that a flight from air to air cannot contain, a take-off or a landing, become waypoints where the route has them.
+In a flight from air to air, take-off and landing items become waypoints where the route has them.
 An extra waypoint, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it accepts a
-waypoint a radius early, and returns to launch after the last one.  A mission that ends with an RTL has the RTL at its
-end, or before the landing sequence that follows it, and its rally points are uploaded too.  An unlimited loiter at the
-mission's end is uploaded unchanged; planfly ends the flight after a minute and one lap of it.  An autopilot that
+waypoint a radius early, and returns to launch after the last one. A mission that ends with an RTL has the RTL at its
+end, or before the landing sequence that follows it, and its rally points are uploaded too. An unlimited loiter at the
+mission's end is uploaded unchanged; planfly ends the flight after a minute and one lap of it. An autopilot that
 loiters indefinitely about the last waypoint gets no extra waypoint either.
 """
 
@@ -50,7 +50,8 @@ class UploadedMission:
 def make_uploaded_mission(setup: FlightSetup) -> UploadedMission:
     """Build the mission that is uploaded for a setup; its altitudes are AMSL, except at rally points.
 
-    A mission that begins and ends on the ground is uploaded unchanged.
+    A mission that begins and ends on the ground is uploaded unchanged. Raises ValueError for a setup that
+    simulates only a take-off, only a landing, or both without a home.
     """
     if setup.ground_phases:
         # The mission as in its file; a home without an altitude gets the altitude of the ground.

@@ -26,12 +26,12 @@ _PANIC_MARK = "PANIC:"
 _PR_SET_PDEATHSIG = 1
 
 
-def check_binary(binary: Path, kind: str) -> str:
+def check_binary(binary: Path, title: str) -> str:
     """Check that an autopilot's program can be run, and return its SHA-256 as hex.
 
     Raises FlightError, in one line, if the program cannot be run.
 
-    kind: name of the expected autopilot.
+    title: name of the expected autopilot.
 
     >>> try:
     ...     check_binary(Path("missing/arduplane"), "ArduPlane")
@@ -40,7 +40,7 @@ def check_binary(binary: Path, kind: str) -> str:
     missing/arduplane: no such file; expected the SITL program of ArduPlane
     """
     if not binary.is_file():
-        raise FlightError(f"{binary}: {missing_text(binary)}; expected the SITL program of {kind}", file=binary)
+        raise FlightError(f"{binary}: {missing_text(binary)}; expected the SITL program of {title}", file=binary)
     if not os.access(binary, os.X_OK):
         raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
     try:
@@ -68,7 +68,7 @@ class Launch:
 class AutopilotProcess:
     """Running program of an autopilot, as a context manager.
 
-    Leaving the context kills the program and its children, and removes the program's folder.  A guard process does the
+    Leaving the context kills the program and its children, and removes the program's folder. A guard process does the
     same if planfly is killed.
 
     binary: file of the program, checked by `check_binary`.
@@ -137,16 +137,18 @@ class AutopilotProcess:
         self._kill()
         self._resources.close()
 
-    def watch(self) -> None:
+    def check_running(self) -> None:
         """Raise FlightError, with the last line of the program's output, if the program has panicked or ended."""
-        panic = next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
+        panic = next(
+            (line.partition(_PANIC_MARK)[2].strip() for line in self.output_lines() if _PANIC_MARK in line), ""
+        )
         if panic:
             raise FlightError(f"panicked: {panic}", file=self.binary)
         code = self._process.poll()
         if code is None:
             return
         reason = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        output_lines = self.lines()
+        output_lines = self.output_lines()
         raise FlightError(
             reason + (f": {output_lines[-1]}" if output_lines else ""), file=self.binary, field="exit code", value=code
         )
@@ -164,7 +166,7 @@ class AutopilotProcess:
         self._kill()
 
     def save_log(self, target: Path) -> bool:
-        """Move the program's last log to a file; return True if there was a log."""
+        """Move the program's last log to the file ``target``; return True if there was a log."""
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:
             return False
@@ -196,8 +198,8 @@ class AutopilotProcess:
             self._signal(signal.SIGKILL)
         self._process.wait()
 
-    def lines(self) -> list[str]:
-        """Return the lines of the program's output; blank lines are left out."""
+    def output_lines(self) -> list[str]:
+        """Return the lines of the program's output without blank lines; an empty list if there is no output."""
         try:
             text = (self._folder / _OUTPUT_FILE).read_text(encoding="utf-8", errors="replace")
         except OSError:

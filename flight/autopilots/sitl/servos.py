@@ -38,7 +38,9 @@ class ServoOutput:
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
-        """Return the control at a pulse, microseconds; without a pulse (0), the control at the center pulse.
+        """Return the control (rad, or throttle 0..1) at a pulse in microseconds.
+
+        Without a pulse (0) it is the control at the center pulse.
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value(1700)
         -0.25
@@ -55,7 +57,7 @@ class ServoOutput:
         return values[-1]
 
     def value_at_fraction(self, fraction: float) -> float:
-        """Return the control at a fraction of the servo's throw, from -1 to 1.
+        """Return the control (rad, or throttle 0..1) at a fraction of the servo's throw, from -1 to 1.
 
         The fraction is -1 and 1 at the end pulses, and 0 at the center pulse. A servo with only two knots has its
         center halfway between the end pulses.
@@ -103,7 +105,7 @@ class ServoMap:
 
 
 def load_servo_map(aircraft: Aircraft) -> ServoMap:
-    """Read an aircraft's servos.
+    """Read the servos of an aircraft's controls from its folder.
 
     Raises FlightError, in one line, if an entry is missing, unknown or invalid.
 
@@ -135,7 +137,7 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
 
 
 def _parse_output(name: str, entry: Any) -> ServoOutput:
-    """Return the servo of the named control from its table in the file.  Raises ValueError with the entry's name."""
+    """Return the servo of the named control from its table in the file. Raises ValueError with the entry's name."""
     unit = _UNITS[name]
     key = f"value_{unit}" if unit else "value"
     if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:

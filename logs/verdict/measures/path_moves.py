@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from flight.guidance.path import FlyByPath, arc_point, profile_at
+from flight.guidance.path import FlyByPath, point_on_piece, profile_at
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from world.arrays import Floats, Heights
@@ -87,7 +87,7 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
             middle, half_length = 0.5 * (first + last), 0.5 * (last - first)
             # Evaluate the profile at the midpoint, because another parabola or leg may begin at an end.
             altitude, slope, bend = profile_at(nodes, middle)
-            east, north = arc_point(piece, first - start)
+            east, north = point_on_piece(piece, first - start)
             course = piece.course + piece.curvature * (first - start)
             up = altitude - slope * half_length + 0.5 * bend * half_length * half_length
             leg = int(piece.leg) + int(middle > piece.leg_change)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
-from flight.guidance.navigation_error import ERRORS, MOTION, NAVIGATION_LAGS, estimate_motion, start_navigation
+from flight.guidance.navigation_error import ERRORS, MOTION, NAVIGATION_LAGS, estimate_motion, start_navigation_error
 from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import MakeSetup
 from tests.soak import scaled
@@ -19,7 +19,7 @@ def test_navigation_errors_have_their_size_and_their_rate() -> None:
     for sigma, time_constant in (ERRORS["rtk"], ERRORS["gnss"]):
         lags: Record = np.zeros(1, NAVIGATION_LAGS)[0]
         true, estimated = np.zeros(2, MOTION)
-        start_navigation(random.standard_normal(6), lags)
+        start_navigation_error(random.standard_normal(6), lags)
         found = np.empty((count, 6))
         noise = random.standard_normal((count, 3))
         for k in range(count):

@@ -17,9 +17,9 @@ from flight.guidance.path import (
     PIECE,
     FlyByPath,
     Records,
-    arc_point,
     fly_by_path,
     mean_curvature,
+    point_on_piece,
     profile_at,
     project,
     waypoint_records,
@@ -90,7 +90,7 @@ def test_the_waypoints_of_a_missions_landing_are_marked() -> None:
 
 def _end(piece: Record) -> tuple[Floats, float]:
     """Position and course at the end of a piece."""
-    return np.array(arc_point(piece, float(piece.length))), float(piece.course + piece.curvature * piece.length)
+    return np.array(point_on_piece(piece, float(piece.length))), float(piece.course + piece.curvature * piece.length)
 
 
 def _whole(path: FlyByPath, setup: FlightSetup, corners: int = 0) -> None:
@@ -312,7 +312,7 @@ def test_projection_undoes_the_construction(
     # A point `aside` to the right of that `along` on the piece; arcs up to 258 degrees, and a little before.
     piece = _pieces(course, side / radius)[0]
     along = share * radius if share > 0.0 else share * 0.5 * radius
-    east, north = arc_point(piece, along)
+    east, north = point_on_piece(piece, along)
     here = course + piece.curvature * along
     got = project(piece, east + aside * math.cos(here), north - aside * math.sin(here))
     assert got[0] == pytest.approx(along, abs=1e-6 * radius)

@@ -26,17 +26,17 @@ def test_a_catapult_lets_go_at_its_end_and_a_hand_where_it_stands() -> None:
     """6 m of rail at 30 degrees lead 5.196 m ahead and 3 m up, from a metre over the ground."""
     take_off = circuit(RAIL, None).ground_phases.take_off
     assert take_off is not None
-    place, velocity = take_off.release()
+    place, velocity = take_off.release_state()
     assert place == pytest.approx([5.196, 0.0, 4.0], abs=1e-3)
     assert velocity == pytest.approx([17.321, 0.0, 10.0], abs=1e-3)
     assert take_off.acceleration == pytest.approx(33.33, abs=0.01)
     hand = circuit(replace(RAIL, method="hand"), None).ground_phases.take_off
     assert hand is not None
-    assert hand.release()[0] == pytest.approx([0.0, 0.0, 1.8])
+    assert hand.release_state()[0] == pytest.approx([0.0, 0.0, 1.8])
     runway = circuit(replace(RAIL, method="runway", speed=None), None).ground_phases.take_off
     assert runway is not None
-    assert runway.release()[0] == pytest.approx([0.0, 0.0, 0.0])
-    assert not runway.release()[1].any()
+    assert runway.release_state()[0] == pytest.approx([0.0, 0.0, 0.0])
+    assert not runway.release_state()[1].any()
 
 
 def test_without_a_course_it_is_launched_along_the_first_leg_and_without_a_pitch_at_four_degrees() -> None:

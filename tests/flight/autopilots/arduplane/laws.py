@@ -8,7 +8,7 @@ import numpy as np
 from flight.autopilots.arduplane.law import ARDUPILOT_MEMORY
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.state import STATE
-from flight.guidance.lateral_reference_laws import waypoint_column
+from flight.guidance.lateral_reference_laws import strided_waypoints
 from flight.guidance.navigation_error import MOTION
 from world.kernels import Record
 from world.scenario_tables import ArduPlaneVersion
@@ -37,7 +37,7 @@ def flying(east: float = 0.0, north: float = 0.0, up: float = 500.0, course: flo
 
 def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     """Waypoints (w,) at east, north, up, flown to at 25 m/s; fields: of all of them."""
-    made = waypoint_column(len(points))
+    made = strided_waypoints(len(points))
     made["east"], made["north"], made["up"] = np.array(points).T
     made["airspeed"] = 25.0
     for name, value in fields.items():

@@ -178,7 +178,7 @@ def test_killed_we_leave_neither_program_nor_folder(tmp_path: Path, first: str) 
 def test_a_watch_tells_how_the_program_ended(tmp_path: Path, text: str, said: str) -> None:
     def watch() -> None:
         for _ in range(6000):
-            process.watch()
+            process.check_running()
             time.sleep(0.01)
 
     with started(script(tmp_path, text)) as process, pytest.raises(FlightError) as ended:

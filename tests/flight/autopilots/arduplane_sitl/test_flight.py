@@ -7,7 +7,7 @@ import pytest
 
 from flight.autopilots.sitl.flight import distances_from_route_end, place_on_path
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
-from flight.guidance.lateral_reference_laws import waypoint_column
+from flight.guidance.lateral_reference_laws import strided_waypoints
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import NODE, PIECE
 
@@ -16,7 +16,7 @@ FIRST = (0.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)
 SECOND = (1000.0, 1000.0, 0.0, 1000.0, math.pi / 2, 0.0, 1, math.inf)
 PIECES = np.array([FIRST, SECOND], PIECE)
 NODES = np.array([(0.0, 500.0, 0.0, 0.0), (1000.0, 500.0, 0.05, 0.0), (2000.0, 550.0, 0.05, 0.0)], NODE)
-WAYPOINTS = waypoint_column(3)
+WAYPOINTS = strided_waypoints(3)
 WAYPOINTS["east"], WAYPOINTS["north"] = (0.0, 0.0, 1000.0), (0.0, 1000.0, 1000.0)
 
 

@@ -84,7 +84,7 @@ def test_the_rail_of_a_launch_is_as_steep_and_as_quick_as_the_launch() -> None:
     """From 6 m before its end, 1.2 m lower, at rest, to 20 m/s in 0.6 s; 33 m/s^2 are felt along the nose."""
     take_off = circuit(RAIL, STRIP).ground_phases.take_off
     assert take_off is not None
-    place, velocity = take_off.release()
+    place, velocity = take_off.release_state()
     begin = Release(
         (46.0, 8.0, float(place[2])),
         (0.0, RAIL.incline, math.radians(90.0)),
@@ -156,5 +156,5 @@ def test_whoever_launches_waits_for_all_of_the_motor_where_it_runs_before(
     with AutopilotFlight(setup, AEROSONDE, autopilot, {}) as flight:
         began = flight.autopilot_time
         for _ in flight._wait_for_thrust():
-            flight._lockstep.hold(flight._rail)
+            flight._lockstep.step_on_rail(flight._rail)
         assert flight.autopilot_time - began == pytest.approx(seconds, abs=0.01)

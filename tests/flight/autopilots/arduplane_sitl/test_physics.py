@@ -149,7 +149,7 @@ def looked_at(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> Callable[..
     def begin(silence: float, leaps: dict[int, float] | None = None) -> Looks:
         looks = Looks(leaps)
         monkeypatch.setattr(physics, "SILENCE_TIMEOUT_S", silence)
-        port.watch, port._clock = looks, RunningClock(lambda: looks.now)
+        port.check_program, port._clock = looks, RunningClock(lambda: looks.now)
         looks.now += 0.1  # since the port was opened
         return looks
 
@@ -182,7 +182,7 @@ def test_what_was_asked_before_the_answer_came_has_had_it(
     port: PhysicsPort, autopilot: socket.socket, looked_at: Callable[..., Looks]
 ) -> None:
     looked_at(10.0)
-    port.watch = lambda: None
+    port.check_program = lambda: None
     for frame in (3, 3, 3):
         autopilot.send(packet(frame))
     port.receive()
@@ -235,7 +235,7 @@ def test_a_wait_watches_the_program(port: PhysicsPort) -> None:
     def gone() -> None:
         raise FlightError("ended")
 
-    port.watch = gone
+    port.check_program = gone
     with pytest.raises(FlightError, match="ended"):
         port.receive()
 
@@ -459,7 +459,7 @@ def test_a_step_tells_the_motion_of_a_trimmed_flight(exchange: Exchange) -> None
 
 
 def test_the_batterys_volts_and_amperes_are_told(exchange: Exchange) -> None:
-    exchange.lockstep.hold(rail_end(exchange.fdm.read(), (-4.0, 0.0, 0.0)))
+    exchange.lockstep.step_on_rail(rail_end(exchange.fdm.read(), (-4.0, 0.0, 0.0)))
     exchange.fdm.write(exchange.trim.commands())
     exchange.lockstep.step()
     resting, flying = (told["battery"] for told in exchange.port.told)
@@ -512,7 +512,7 @@ def test_satellites_mistake_what_is_told_on_the_rail_and_off_it(exchange: Exchan
     lockstep, told = exchange.lockstep, exchange.port.told
     for error in ((0.0,) * 6, (1.0, 2.0, 3.0, 0.1, 0.2, 0.3)):
         lockstep.error = error
-        lockstep.hold(rail)
+        lockstep.step_on_rail(rail)
     right, wrong = told
     assert np.subtract(wrong["position"], right["position"]) == pytest.approx([1.0, 2.0, -3.0], abs=1e-3)
     assert np.subtract(wrong["velocity"], right["velocity"]) == pytest.approx([0.1, 0.2, -0.3], abs=1e-3)
@@ -523,6 +523,6 @@ def test_satellites_mistake_what_is_told_on_the_rail_and_off_it(exchange: Exchan
 
 def test_a_look_is_taken_every_tenth_of_a_second(exchange: Exchange) -> None:
     for _ in range(3 * POLL_INTERVAL_FRAMES):
-        exchange.lockstep.serve()
+        exchange.lockstep.answer_frame()
     assert exchange.looks == 3
     assert exchange.lockstep.time == pytest.approx(0.3)

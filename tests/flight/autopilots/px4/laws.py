@@ -8,7 +8,7 @@ import numpy as np
 from flight.autopilots.px4.law import PX4_MEMORY
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.dynamics.state import STATE
-from flight.guidance.lateral_reference_laws import waypoint_column
+from flight.guidance.lateral_reference_laws import strided_waypoints
 from flight.guidance.navigation_error import MOTION
 from world.kernels import Record
 from world.scenario_tables import Px4Version
@@ -44,7 +44,7 @@ def flying(
 
 def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     """Waypoints (w,) at east, north, up, flown to at 25 m/s; fields: of all of them."""
-    made = waypoint_column(len(points))
+    made = strided_waypoints(len(points))
     made["east"], made["north"], made["up"] = np.array(points).T
     made["airspeed"] = 25.0
     made["stop"], made["loiter_time"] = np.arange(len(points)), math.nan
