@@ -410,7 +410,7 @@ class RunningFlight:
         record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
         self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
         if self._navigation_random is not None:
-            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
+            start_navigation_error(self._navigation_random.standard_normal(6), record.navigation)
 
     def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Create the workspace of the compiled loop for a route, and set the flight's time limit.

@@ -78,8 +78,8 @@ STRAIGHT_RADIUS_RATIO = 10.0
 # Fraction of the corridor's half width.  A corner is negligible if the path without its waypoint passes the waypoint
 # within this. An aircraft on that path, or as far away on the waypoint's other side, is well inside the corridor.
 KINK_FRACTION = 0.25
-# Waypoints.  Largest number of consecutive waypoints that are left out together when a turn or a step of altitude is
-# tested for being negligible. The lines of a survey are longer than such a piece.
+# Waypoints.  A turn or a step of altitude is negligible if a path without up to this many consecutive waypoints is
+# flyable and near enough. The lines of a survey are longer than such a piece.
 KINK_WAYPOINT_COUNT = 8
 
 # The slope rule
@@ -90,14 +90,14 @@ KINK_WAYPOINT_COUNT = 8
 NEGLIGIBLE_STEP_M = 10.0
 # rad.  A fitted slope may differ from the plan by this, in addition to the fit's own tolerance.
 SLOPE_TOLERANCE_RAD = math.radians(0.5)
-# m.  Largest distance above or below the leg's line. The blends at the leg's ends, where the slope changes, do not
-# count.
+# m.  Largest distance above or below the leg's line. The blends at the leg's ends, where the slope changes, are not
+# judged.
 HEIGHT_ERROR_LIMIT_M = 10.0
 # m.  Largest distance above or below the line of a leg that is so short that it consists of blends only.
 SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
-# rad.  The pitch counts as being at the autopilot's limit if it is at most this far below the limit.
+# rad.  The pitch is at the autopilot's limit if it is at most this far below the limit.
 PITCH_LIMIT_TOLERANCE_RAD = math.radians(1.0)
-# rad.  A leg with a gentler slope counts as level.
+# rad.  A leg with a gentler slope is level.
 LEVEL_SLOPE_RAD = math.radians(0.5)
 # m/s.  Texts call a wind below this calm air.
 CALM_WIND_MPS = 0.5
@@ -130,12 +130,12 @@ SPEED_MEMORY_S = 12.0
 # m/s.  Smallest airspeed V with which the rate g w/V of `SPEED_MEMORY_S` is computed. It bounds the rate for an
 # aircraft that has nearly stopped.
 MIN_AIRBORNE_AIRSPEED_MPS = 10.0
-# Fraction of a time window.  The throttle counts as being at a limit in a window if it is there for at least this
-# fraction of it.
+# Fraction of a time window.  The throttle is at a limit in a window if it is at the limit for at least this fraction
+# of the window.
 SATURATED_FRACTION = 0.8
-# Throttle, relative to the autopilot's limit.  A throttle of at least this counts as full.
+# Throttle, relative to the autopilot's limit.  A throttle of at least this is full throttle.
 FULL_THROTTLE_FRACTION = 0.99
-# Throttle 0..1.  A throttle of at most this counts as idle.
+# Throttle 0..1.  A throttle of at most this is idle.
 IDLE_THROTTLE_FRACTION = 0.01
 # A.  The motor is off if the battery current is at most this.
 ZERO_CURRENT_A = 0.02
@@ -146,7 +146,7 @@ SATURATED_THROTTLE_FRACTION = 0.999
 ABILITY_WINDOW_S = 1.5
 # s.  An ability to climb or sink is measured from this time after the throttle has reached its limit.
 ABILITY_SETTLING_S = 0.5
-# s.  Values that are measured this far apart count as independent.
+# s.  Values that are measured this far apart are assumed to be independent.
 ABILITY_SAMPLE_INTERVAL_S = 0.5
 # m/s of climb.  Resolution of the climb rate that follows from speed and acceleration.
 CLIMB_RATE_RESOLUTION_MPS = 0.02
@@ -160,9 +160,9 @@ MAX_STEADY_ACCELERATION_MPS2 = 0.5
 
 # Courses and slopes by least squares
 
-# m.  Length at either end of a leg, beyond the turns, that is left out of a fit of its course or slope.
+# m.  A fit of a leg's course or slope does not use this length at either end of the leg, beyond the turns.
 TURN_EXCLUSION_M = 100.0
-# m.  Length that is left out of a fit of a leg's slope next to a change of slope, and at the route's first waypoint.
+# m.  A fit of a leg's slope does not use this length next to a change of slope, and at the route's first waypoint.
 BLEND_EXCLUSION_M = 20.0
 # m.  Shortest piece of a leg to which a course is fitted.
 MIN_COURSE_STRETCH_M = 60.0
@@ -195,7 +195,7 @@ NOTABLE_HEIGHT_ERROR_M = 25.0
 # 80 turns of PX4 (95 to 180 degrees, wind up to 12 m/s, light turbulence).
 FLY_OVER_SWING_RATIO = 1.25
 # m.  A path may pass a waypoint twice, at different altitudes. If both distances differ by less than this, the pass
-# that is nearer in altitude counts.
+# that is nearer in altitude is judged.
 EQUAL_DISTANCE_TOLERANCE_M = 0.5
 # m/s.  Tolerance of a leg's mean airspeed.
 MEAN_SPEED_TOLERANCE_MPS = 1.0
@@ -358,11 +358,11 @@ PARTIAL_LEG_MIN_S = 2.0
 MAX_UNSEEN_TIME_S = 10.0
 # m.  A flight that stays further than this from every waypoint of a plan was flown somewhere else.
 PLAN_MISMATCH_DISTANCE_M = 1000.0
-# m.  When the order of waypoints is checked, a waypoint counts as passed within the corridor's half width, but at least
-# within this.
+# m.  When the order of waypoints is checked, the aircraft has passed a waypoint if its distance from the waypoint was
+# at most the half width of the corridor. If the half width is less than this, this distance applies.
 MIN_NEAR_WAYPOINT_M = 50.0
-# m.  When the order of waypoints is checked, a waypoint counts as passed within the corridor's half width, but at most
-# within this.
+# m.  When the order of waypoints is checked, the aircraft has passed a waypoint if its distance from the waypoint was
+# at most the half width of the corridor. If the half width is more than this, this distance applies.
 MAX_NEAR_WAYPOINT_M = 150.0
 # Fraction of the passed waypoints.  At least this many must be passed in the plan's order; otherwise the log is a
 # flight of another plan.
@@ -373,7 +373,7 @@ MAX_PLAUSIBLE_POSITION_M = 1e7
 MAX_PLAUSIBLE_SPEED_MPS = 1e4
 # rad, deflection, m/s.  Largest plausible attitude, control or wind; a row with a larger one is invalid.
 MAX_PLAUSIBLE_VALUE = 1e3
-# s.  Two stays in a sphere count as one if the pause between them is at most this, which is the effect of rounding.
+# s.  Two stays in a sphere are one stay if the pause between them is at most this, which is the effect of rounding.
 SPHERE_STAY_TOLERANCE_S = 1e-6
 # Diagonals of a block of segments.  Segments of the track that are further than this from a sphere's center are joined
 # to longer ones for the exposure, which changes it by less than 0.1 %.
@@ -387,7 +387,7 @@ PX4_LANDING_BUFFER_RAD = math.radians(0.1)
 PX4_FIRST_WAYPOINT_DISTANCE_M = 10_000.0
 # m.  Largest distance between waypoints: the default of MIS_DIST_WPS, in the releases that had this parameter.
 PX4_WAYPOINT_SPACING_M = 900.0
-# m.  A condition gate nearer than this to a waypoint counts as being at the waypoint.
+# m.  A condition gate nearer than this to a waypoint is at the waypoint.
 PX4_GATE_SPACING_M = 0.05
 
 # Suggestions

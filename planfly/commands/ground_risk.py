@@ -42,7 +42,7 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--controlled",
         action="store_true",
-        help="the ground below is a controlled area, where nobody is except people involved in the flight",
+        help="only people who are involved in the flight are in the area below",
     )
     for name, unit, text in (
         ("max_speed", "M/S", "maximum speed of the aircraft, m/s (default: the highest airspeed of its model)"),

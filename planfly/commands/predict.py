@@ -24,7 +24,7 @@ def add_predict_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly predict``."""
     parser = command_line.add_command(
         "predict",
-        "predict a logged flight, which the model has not seen, as bands of 95 %, and count how often the flight is"
+        "predict a logged flight, which the model has not seen, as bands of 95 %, and state how often the flight is"
         " inside them",
         "planfly predict flight.columns.toml --aircraft ./mine --out predicted",
     )

@@ -13,7 +13,7 @@ def add_recover_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly recover``."""
     parser = command_line.add_command(
         "recover",
-        "write a new, complete log from what can be read of an unfinished or damaged one",
+        "write the readable part of an unfinished or damaged log as a new log",
         "planfly recover flight.mcap --out recovered.mcap",
     )
     add_log_argument(parser)

@@ -16,7 +16,7 @@ from planfly.terminal.options import (
 
 # Help text on the modes and commands of the vehicle.
 _VEHICLE_HELP = """
-It flies the modes AUTO, LOITER, GUIDED (to a place) and RTL, and changes between them in flight.
+It flies the modes AUTO, LOITER, GUIDED (to a position) and RTL, and changes between them in flight.
 Before a flight, ground stations can list, read and set parameters by name: the parameters of the simulated autopilot,
 and PFLY_FORCE.  With PFLY_FORCE 1 the vehicle arms and flies even a mission that is judged not flyable (default: 0)."""
 

@@ -46,7 +46,7 @@ def add_survey_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for a change that makes all lines usable. Tried are the distance between photos, the height, "
+        help="look for a change that makes all lines usable. It tries the distance between photos, the height, "
         "turn-arounds, the order and course of the lines, parameters and the airspeed, each in a simulated flight",
     )
     add_world_options(parser)

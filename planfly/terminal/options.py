@@ -326,8 +326,8 @@ def add_imported_log_options(parser: CommandParser) -> None:
     group.add_argument(
         "--datum",
         choices=CHOICES["datum"],
-        help="what the altitudes in the log are above, if the log does not state it: mean sea level (amsl) or the "
-        "WGS 84 ellipsoid",
+        help="datum of the altitudes in the log, if the log does not state it: mean sea level (amsl) or the WGS 84 "
+        "ellipsoid",
     )
 
 
