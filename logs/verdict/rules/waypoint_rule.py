@@ -183,8 +183,7 @@ def explain_by_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Add to each failed finding's reason the circles that the autopilot flew at its waypoints."""
-    circles = [] if aligned is None else waypoint_circles(requirements, aligned)
-    if aligned is None or not circles:
+    if aligned is None or not (circles := waypoint_circles(requirements, aligned)):
         return tuple(findings)
     legs_of_lines = {
         line.first: range(transition[0], line.ends)
