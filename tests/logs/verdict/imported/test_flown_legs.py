@@ -109,9 +109,9 @@ def test_a_waypoint_is_passed_within_the_corridor_but_50_to_150_m(
 
 @pytest.mark.parametrize(("in_order", "kind"), [(8, None), (7, "order")])
 def test_four_fifths_of_the_passed_waypoints_are_in_the_plans_order(in_order: int, kind: str | None) -> None:
-    """Of ten, the plan has the first ones on the flight's second leg up to its end, the rest before it on the first."""
-    second = [[400.0 - 50.0 * k, 100.0 - 12.5 * k, 200.0] for k in reversed(range(in_order))]
-    way = [*second, *([-480.0 + 20.0 * k, 0.0, 200.0] for k in range(10 - in_order))]
+    """Of ten, the plan begins with the flight's last ones, at its end; the others are on the flight's first leg."""
+    last = [[400.0 - 20.0 * k, 100.0 - 5.0 * k, 200.0] for k in range(10 - in_order)]
+    way = [*last, *([-480.0 + 50.0 * k, 0.0, 200.0] for k in range(in_order))]
     found = plan_mismatch(along(way), LOG.track)
     assert (None if found is None else found.kind) == kind
 
