@@ -70,16 +70,13 @@ def return_findings(
         return [*_rtl_findings(requirements, ok=None, outcome="not flown yet"), *end_findings, *required_findings]
     if requirements.setup.imported_log is None:
         return []
-    has_passed_end = aligned is not None and bool(aligned.passed[-1])
     continues_to_landing = requirements.setup.route.rtl_end <= requirements.legs
-    return _flown_rtl_findings(
-        requirements,
-        has_passed_end
-        and (
-            continues_to_landing
-            or (aligned is not None and return_loiter_reach(requirements.setup.route, aligned.track) is not None)
-        ),
+    has_arrived = (
+        aligned is not None
+        and bool(aligned.passed[-1])
+        and (continues_to_landing or return_loiter_reach(requirements.setup.route, aligned.track) is not None)
     )
+    return _flown_rtl_findings(requirements, has_arrived)
 
 
 def flown_return_findings(

@@ -191,8 +191,7 @@ def with_circles_in_reasons(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Return the findings, and add to each failure's reason the circles that the autopilot flew at its waypoints."""
-    circles = {} if aligned is None else waypoint_circles(requirements, aligned)
-    if aligned is None or not circles:
+    if aligned is None or not (circles := waypoint_circles(requirements, aligned)):
         return tuple(findings)
     legs_of_lines = {
         line.first: range(transition[0], line.ends)

@@ -2,13 +2,20 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.path_moves import planned_moves
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.zone_visits import DEPTH_PRECISION
 from logs.verdict.rules import registry
+from logs.verdict.suggestions import _smallest_shift
 from tests.logs.verdict.judging import leg, missile, of, suggested
 from tests.synthetic import make_scenario, make_setup
+from world.airspace.zone_kernels import zone_records
+from world.airspace.zones import Zone, make_polygon
 
 
 def climb(degrees: float, run: float = 4000.0) -> Finding:
@@ -79,3 +86,22 @@ def test_no_suggestions_for_more_findings_than_one_change_can_mend(
     slopes = [of(verdict, "slope", leg(k)) for k in range(3)]
     assert [item.ok for item in verdict.findings].count(False) == 3
     assert [bool(item.suggestions) for item in slopes] == [has_suggestions] * 3
+
+
+@pytest.mark.parametrize(("trials", "is_found"), [(40, True), (41, False)])
+def test_a_shift_past_a_zone_is_found_in_forty_trials(trials: int, is_found: bool) -> None:
+    """A path 100 m inside a zone, parallel to an edge that is nearly parallel to the shift.
+
+    A shift by the depth leaves 1 - sin(angle) of it, so that trial k has 100 m (1 - sin(angle))^(k - 1): more than
+    `DEPTH_PRECISION` up to trial ``trials`` - 1, and less from trial ``trials`` on.
+    """
+    left = (DEPTH_PRECISION / 100.0) ** (1.0 / (trials - 1.5))
+    angle = math.asin(1.0 - left)
+    along, outward = np.array([math.cos(angle), math.sin(angle)]), np.array([math.sin(angle), -math.cos(angle)])
+    ends = [5000.0 * along, 5000.0 * along - 3000.0 * outward, -5000.0 * along - 3000.0 * outward, -5000.0 * along]
+    zone = Zone("edge", "exclusion", make_polygon([[(float(east), float(north)) for east, north in ends]]))
+    line = [[*(distance * along - 100.0 * outward), 300.0] for distance in (-500.0, 500.0)]
+    moves = planned_moves(route_requirements(make_setup(line)))
+    shift = _smallest_shift(moves, zone_records([zone]), None, "east", 1.0, math.inf)
+    expected = sum(100.0 * left**k for k in range(trials - 1)) if is_found else None
+    assert shift == (None if expected is None else pytest.approx(expected, abs=0.01))

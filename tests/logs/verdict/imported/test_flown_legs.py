@@ -107,6 +107,15 @@ def test_a_waypoint_is_passed_within_the_corridor_but_50_to_150_m(
     assert (None if found is None else found.kind) == kind
 
 
+@pytest.mark.parametrize(("in_order", "kind"), [(8, None), (7, "order")])
+def test_four_fifths_of_the_passed_waypoints_are_in_the_plans_order(in_order: int, kind: str | None) -> None:
+    """Of ten, the plan begins with the flight's last ones, at its end; the others are on the flight's first leg."""
+    last = [[400.0 - 20.0 * k, 100.0 - 5.0 * k, 200.0] for k in range(10 - in_order)]
+    way = [*last, *([-480.0 + 50.0 * k, 0.0, 200.0] for k in range(in_order))]
+    found = plan_mismatch(along(way), LOG.track)
+    assert (None if found is None else found.kind) == kind
+
+
 def test_a_flight_that_went_home_half_way_is_not_another_plan() -> None:
     way = [[-500.0, 0.0, 200.0], [-200.0, 0.0, 200.0], [0.0, 0.0, 200.0], [3000.0, 0.0, 200.0], [6000.0, 0.0, 200.0]]
     assert plan_mismatch(along(way), LOG.track) is None

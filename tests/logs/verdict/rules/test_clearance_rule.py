@@ -273,3 +273,14 @@ def test_the_take_off_and_the_landing_of_a_log_need_no_height() -> None:
     assert judged(lambda s: grounded(s) + bump(2500.0, -32.0, 50.0)(s))[0].ok is False
     # Once it has climbed, it may not come back to the ground.
     assert judged(lambda s: grounded(s) + bump(1200.0, -45.0, 50.0)(s))[0].ok is False
+
+
+@pytest.mark.parametrize(("low_to", "ok"), [(1900.0, True), (2100.0, False)])
+def test_a_log_that_is_low_beyond_two_kilometres_from_home_has_not_just_taken_off(low_to: float, ok: bool) -> None:
+    """At 5 m, 15 m are required; it may climb from the ground as long as it is near home."""
+    take_off = "3 22 15 0 0 0 0 0 50"
+    lines = (take_off, wp(0, 5000, 50), wp(3000, 5000, 50))
+    setup = logged(setup_of(*lines, home="36.5 -84.2 100", limits={"min_clearance_m": 15.0}))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, up=lambda s: -45.0 * np.clip((low_to - s) / 50.0, 0.0, 1.0)))
+    assert clearance_findings(requirements, aligned)[0].ok is ok

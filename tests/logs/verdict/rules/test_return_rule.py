@@ -13,7 +13,7 @@ from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.route import make_route
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import FlightSetup, ImportedLog
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from logs.recording.reader import read_log
@@ -23,7 +23,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_progress import return_loiter_reach
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.rules.return_rule import without_path_following_findings
+from logs.verdict.rules.return_rule import return_findings, without_path_following_findings
 from logs.verdict.verdict import Verdict
 from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
@@ -234,6 +234,10 @@ def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: fl
     aligned = align_track(requirements, rows)
     assert aligned is not None
     assert (return_loiter_reach(setup.route, aligned.track) is not None) is arrived
+    imported = replace(setup, imported_log=ImportedLog("a.BIN", "", ""))
+    found = return_findings(route_requirements(imported), aligned)
+    assert [one.ok for one in found] == [True if arrived else None]
+    assert ("the flight did not reach its end" in found[0].reason) is not arrived
 
 
 BEHIND_THE_HILL = (wp(0, 500, 600), wp(4500, 500, 600))

@@ -1,5 +1,6 @@
 """Which rows are usable, and which waypoints a flight has passed, just inside and just outside."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,9 +8,10 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.measures.track_alignment import airspeed_gain_in_rising_air, align_track
 from tests.synthetic import edited, fly_path, make_setup, waypoint_stations
 
+GRAVITY = 9.80665
 STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
 
 
@@ -88,3 +90,19 @@ def test_a_place_passed_twice_has_each_time_the_rows_of_its_own_passage() -> Non
     aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     assert aligned.track.time[aligned.rows] == pytest.approx(stations / 25.0, abs=1.0)
+
+
+def test_speed_from_rising_air_fades_within_twelve_seconds() -> None:
+    time = np.arange(0.0, 60.0, 0.01)
+    rising = np.where(time < 5.0, 1.0, 0.0).astype(np.float32)
+    gained = airspeed_gain_in_rising_air(time, np.full(time.size, 25.0, dtype=np.float32), rising)
+    ended = int(np.argmax(gained))
+    assert gained[ended + 1200] / gained[ended] == pytest.approx(math.exp(-1.0), rel=0.01)
+
+
+@pytest.mark.parametrize(("speed", "gains_as"), [(2.0, 10.0), (9.0, 10.0), (11.0, 11.0)])
+def test_an_aircraft_that_has_nearly_stopped_gains_as_one_at_ten_metres_a_second(speed: float, gains_as: float) -> None:
+    time = np.arange(0.0, 0.2, 0.01)
+    airspeed = np.full(time.size, speed, dtype=np.float32)
+    gained = airspeed_gain_in_rising_air(time, airspeed, np.ones(time.size, dtype=np.float32))
+    assert gained[-1] == pytest.approx(GRAVITY * 0.19 / gains_as, rel=0.02)

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Home
+from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.photo_lines import LineMeasure, _line_steps, heights_over_ground
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.survey_rule import _is_too_tight, unusable_parts_text
 from tests.logs.verdict.judging import judge
 from tests.synthetic import bank_radius, fly_path, make_setup
+from world.terrain import make_gridded_terrain
 
 
 @pytest.mark.parametrize(("off", "lost"), [(4.9, 0.0), (5.1, 20.0), (-4.9, 0.0), (-5.1, 20.0)])
@@ -53,3 +55,17 @@ def test_without_terrain_heights_are_over_home_or_the_lowest_waypoint(home: floa
     place = None if home is None else Home(46.0, 8.0, home)
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None), mission=replace(setup.mission, home=place))
     assert heights_over_ground(route_requirements(bare), setup.route.positions).tolist() == up
+
+
+@pytest.mark.parametrize(("known_to", "ok"), [(950.5, True), (949.5, None)])
+def test_a_planned_line_over_unknown_ground_is_looked_at_metre_by_metre(known_to: float, ok: bool | None) -> None:
+    """Of 1,000 m a twentieth may be unknown: 49.5 m are 50 of 1,001 places, less than 5 %, and 50.5 m are 51."""
+    ways = [
+        [(200.0 * k, north) for north in (-300.0, 0.0, 1000.0, 1300.0)][:: 1 if k % 2 == 0 else -1] for k in range(3)
+    ]
+    east, north = np.arange(-1000.0, 1501.0, 50.0), known_to + np.arange(-2000.0, 1.0, 50.0)
+    heights = np.zeros((north.size, east.size))
+    ground = make_gridded_terrain(heights, east, north, source="level", sha256="", datum="mean sea level")
+    setup = make_setup([[*place, 100.0] for way in ways for place in way], limits={"surveys": "lines"}, ground=ground)
+    first = next(item for item in judge_geometry(setup).findings if item.rule == "survey")
+    assert first.ok is ok
