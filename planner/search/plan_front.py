@@ -31,7 +31,7 @@ from planner.plan import Objective, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
-from planner.search.seeds import with_waypoints
+from planner.search.seeds import halve_longest_legs
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
@@ -203,7 +203,7 @@ def plan_front(
     task = front_task(scenario, limits)
     if default is None:
         default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
-    path = with_waypoints(default.waypoints, waypoints or 0)
+    path = halve_longest_legs(default.waypoints, waypoints or 0)
     task = fit_margins(task, path)
     default_plan = _with_values(task, default)
     reference = reference_point(task, default_plan)

@@ -35,13 +35,13 @@ from planner.search.search_state import (
 )
 from planner.search.seeds import (
     MIN_DETOUR_FRACTION,
+    halve_longest_legs,
     may_turn_back,
     search_other_sides,
     search_turning_back,
     shorten_best,
     starting_vectors,
     try_straight_line,
-    with_waypoints,
 )
 from world.arrays import Floats
 from world.errors import ScenarioError
@@ -124,7 +124,7 @@ def plan_path(
         search.lattice_routes = lattice_routes
         path, path_certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)
         if count < scenario.planner.waypoints:
-            path = with_waypoints(path, scenario.planner.waypoints)
+            path = halve_longest_legs(path, scenario.planner.waypoints)
             path_certificate = certify(problem, path)
         return search, path, path_certificate
 

@@ -14,7 +14,7 @@ from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
-from planner.search.seeds import with_waypoints
+from planner.search.seeds import halve_longest_legs
 from planner.search.shared_budget import Search, SharedBudget
 from world.errors import MissionError
 from world.geometry import leg_courses
@@ -68,7 +68,7 @@ def replan(
         raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{waypoint_count - 2}", file=scenario.name)
     check_same_mission(scenario, old_plan)
     _check_first_waypoint(scenario, old_plan, leg)
-    remaining_path = with_waypoints(old_plan.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
+    remaining_path = halve_longest_legs(old_plan.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
     course = scenario.start_course if leg == 0 else float(leg_courses(old_plan.waypoints)[leg - 1])
     settings = scenario.planner.model_copy(update={"waypoints": len(remaining_path)})
     remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)

@@ -129,7 +129,7 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
             spread=GROUND_SPREAD_STEPS,
             ratio=GRID_SPACING_RATIO,
         )
-        for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.pause):
+        for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.check_stop):
             yield resample(frame.to_world(route.points), count)
 
 
@@ -151,7 +151,9 @@ def _choose_cheaper(
     for extra_margin, slope_margin in EXTRA_MARGINS:
         stricter_data = evaluation_data._replace(angle_margin=evaluation_data.angle_margin + slope_margin)
         try:
-            path, evaluations = shorten_path(stricter_data, path, extra_margin=extra_margin, pause=search.pause)
+            path, evaluations = shorten_path(
+                stricter_data, path, extra_margin=extra_margin, check_stop=search.check_stop
+            )
         except SearchEnded:
             return best_path
         search.evaluations += evaluations

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.airspace.zone_limits import is_limited
-from planner.evaluation.airspace_scores import airspace_counts
+from planner.evaluation.airspace_scores import count_airspace_violations
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
@@ -97,11 +97,11 @@ NARROW_GAIN_FRACTION = 0.002
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
 MIN_MOVE_BUDGET = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
-WAYPOINTS_PER_PAUSE = 4000
-# Number of pauses that a stopped search without a result may still take to find its first route: some 100 ms.
-GRACE_PAUSES = 10
+WAYPOINTS_PER_CHECK = 4000
+# Checks after which a stopped search ends even if it has not found its first route: some 100 ms.
+GRACE_CHECKS = 10
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
-CERTIFICATES_PER_PAUSE = 4
+CERTIFICATES_PER_CHECK = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
@@ -218,7 +218,7 @@ class Search:
     furthest_shortened: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
-    grace: int = GRACE_PAUSES
+    grace: int = GRACE_CHECKS
     lattice_routes: LatticeRoutes = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -233,7 +233,7 @@ class Search:
             return score_table(*graded_scores(data, paths))
         counts, objectives = paper_scores(data, paths)
         if is_limited(data.airspace):
-            counts[:, Violation.BOUNDS] += airspace_counts(data, paths)
+            counts[:, Violation.BOUNDS] += count_airspace_violations(data, paths)
         return score_table(counts, objectives)
 
     def evaluate(self, vectors: Floats) -> Floats:
@@ -241,7 +241,7 @@ class Search:
 
         Raises SearchEnded if the search is asked to stop.
         """
-        batch_size, scores = max(1, WAYPOINTS_PER_PAUSE // self.encoding.waypoints), no_scores()
+        batch_size, scores = max(1, WAYPOINTS_PER_CHECK // self.encoding.waypoints), no_scores()
         for batch_start in range(0, len(vectors), batch_size):
             scores = np.concatenate([scores, self.score(vectors[batch_start : batch_start + batch_size])])
             if len(scores) < len(vectors) and self.should_stop():
@@ -258,7 +258,7 @@ class Search:
             raise SearchEnded
         return scores
 
-    def pause(self) -> None:
+    def check_stop(self) -> None:
         """Raise SearchEnded if the search is asked to stop.
 
         A search without a result continues for a few more pauses to find its first route. If it finds none, its result
@@ -364,7 +364,7 @@ class Search:
             # Keep the same problem if possible: a new one must be laid out in memory for kernels again.
             stricter_data = data._replace(angle_margin=data.angle_margin + slope_margin) if slope_margin > 0.0 else data
             path, evaluations = shorten_path(
-                stricter_data, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
+                stricter_data, path, extra_margin=extra_margin, corners_too=corners_too, check_stop=self.check_stop
             )
             self.evaluations += evaluations
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
@@ -389,7 +389,7 @@ class Search:
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 break
-            path, evaluations = shorten_path(problem.search, resample(path, len(path)), pause=self.pause)
+            path, evaluations = shorten_path(problem.search, resample(path, len(path)), check_stop=self.check_stop)
             self.evaluations += evaluations
             if path_length(path) < max_length and self.keep_if_finished(path, certify(self.problem, path)):
                 return True
@@ -494,7 +494,7 @@ class Search:
         first_path: tuple[Floats, Certificate] | None = None
         furthest_path: tuple[Floats, Certificate] | None = None
         for index, vector in enumerate(self.archive.vectors):
-            if index >= CERTIFICATES_PER_PAUSE and self.should_stop():
+            if index >= CERTIFICATES_PER_CHECK and self.should_stop():
                 break
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
             # The certificate is the same in all attempts.

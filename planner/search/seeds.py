@@ -138,9 +138,9 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[Gri
     should_shorten = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
-        airspace_routes(data, frame, span, grids, search.pause)
+        airspace_routes(data, frame, span, grids, search.check_stop)
         if is_among_zones
-        else grid_routes(data, frame, span, grids, search.pause)
+        else grid_routes(data, frame, span, grids, search.check_stop)
     )
     for route in routes:
         if should_shorten and search.has_safe():
@@ -220,7 +220,7 @@ def search_other_sides(search: Search) -> None:
             if search.must_end():
                 break
             data = _close_narrow_places(search, step, step + depth)
-            route = ceiling_route(data, frame, step, depth, search.pause)
+            route = ceiling_route(data, frame, step, depth, search.check_stop)
             if not len(route):
                 continue
             path = resample(route, search.encoding.waypoints)
@@ -258,7 +258,7 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
         step = frame.length / grid.stages
         closed_data = _close_narrow_places(search, step, (1.0 + shrink) * step - data.kill_margin)
-        for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.pause):
+        for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.check_stop):
             if route.cost > _max_route_cost(search):
                 break
             if search.must_end():
@@ -390,7 +390,7 @@ def _search_lattices(
         try:
             if key not in search.lattice_routes:
                 search.lattice_routes[key] = lattice_route(
-                    data, frame, step_fraction * step, search.pause, remaining_states, is_guided=is_guided
+                    data, frame, step_fraction * step, search.check_stop, remaining_states, is_guided=is_guided
                 )
         except SearchEnded:
             break
@@ -405,7 +405,7 @@ def _search_lattices(
         path, certificate, is_shortened = _search_along_route(search, route)
         if not search.meets_goal(certificate):
             # The route itself may be safe, with its points as waypoints.
-            route_path = with_waypoints(route, search.encoding.waypoints)
+            route_path = halve_longest_legs(route, search.encoding.waypoints)
             route_certificate = certify(search.problem, route_path)
             if search.meets_goal(route_certificate):
                 path, certificate = route_path, route_certificate
@@ -420,7 +420,7 @@ def _search_lattices(
     return best, remaining_states > 0
 
 
-def with_waypoints(path: Floats, count: int) -> Floats:
+def halve_longest_legs(path: Floats, count: int) -> Floats:
     """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
     waypoints = [np.asarray(point, dtype=np.float64) for point in path]
     while len(waypoints) < count:

@@ -290,8 +290,8 @@ class AirspaceSearch(NamedTuple):
     stage: int
 
 
-# Number of cells reached between two calls of `pause`: some 20 ms at most.
-CELLS_PER_PAUSE = 100_000
+# Number of cells reached between two calls of `check_stop`: some 20 ms at most.
+CELLS_PER_CHECK = 100_000
 
 
 def cheapest_airspace_route(
@@ -300,7 +300,7 @@ def cheapest_airspace_route(
     grid: AirspaceGrid,
     extra: Floats,
     bound: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, float]:
     """Find the cheapest route over a grid; return its points and its cost.
 
@@ -308,15 +308,15 @@ def cheapest_airspace_route(
 
     extra: (stages + 1, across) additional cost per m.
     bound: upper limit on the cost of the route; dearer routes are not found.
-    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    check_stop: called after every `CELLS_PER_CHECK` cells; an exception raised there stops the search.
 
     Without a route, the points are (0, 3) and the cost is inf.
     """
-    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers))
+    stages = max(1, CELLS_PER_CHECK // (grid.across.size * grid.layers))
     search: AirspaceSearch = begin_airspace_route(data, frame, grid)
     while search.stage < grid.stages:
         search = continue_airspace_route(data, frame, grid, extra, bound, search, stages)
-        pause()
+        check_stop()
     points, cost = end_airspace_route(data, frame, grid, search)
     return points, cost
 
@@ -491,13 +491,13 @@ def airspace_routes(
     frame: RotatedFrame,
     span: tuple[float, float],
     grids: tuple[tuple[int, int], ...],
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Yield routes over grids, for a problem with zones or a maximum height.
 
     span: lowest and highest position across, m.
     grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
 
     Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. Before that, the first grid is
     searched without this restriction, because narrow gaps may require steep or curved routes.
@@ -506,7 +506,7 @@ def airspace_routes(
     for index, (stages, route_count) in enumerate(grids):
         grid = airspace_grid(data, frame, span, STAGE_FACTOR * stages)
         if index == 0:
-            route = _find_route(data, frame, grid._replace(gentle=False), (), expected_cost, pause)
+            route = _find_route(data, frame, grid._replace(gentle=False), (), expected_cost, check_stop)
             if route is not None:
                 yield route
         earlier_routes: tuple[GridRoute, ...] = ()
@@ -517,7 +517,7 @@ def airspace_routes(
                 grid,
                 earlier_routes,
                 math.inf if earlier_routes else FINER_COST_RATIO * expected_cost,
-                pause,
+                check_stop,
             )
             if route is None:
                 break
@@ -532,17 +532,17 @@ def _find_route(
     grid: AirspaceGrid,
     earlier_routes: tuple[GridRoute, ...],
     expected_cost: float,
-    pause: Callable[[], None],
+    check_stop: Callable[[], None],
 ) -> GridRoute | None:
     """Return the cheapest route over a grid that keeps away from earlier routes; None without one.
 
     earlier_routes: routes near which a path costs more.
     expected_cost: upper limit on the cost with which the search is tried first; the second search has no limit.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
     """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):
-        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)
+        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, check_stop)
         if len(points):
             return GridRoute(points, float(cost))
         if bound == math.inf:

@@ -454,8 +454,8 @@ class GridSearch(NamedTuple):
     stage: int
 
 
-# Number of cells reached between two calls of `pause`: some 10 ms.
-CELLS_PER_PAUSE = 150_000
+# Number of cells reached between two calls of `check_stop`: some 10 ms.
+CELLS_PER_CHECK = 150_000
 
 
 def cheapest_route(
@@ -464,21 +464,21 @@ def cheapest_route(
     grid: Grid,
     extra: Floats,
     bound: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> tuple[Records, float]:
     """Find the cheapest route over a grid; return its `ROUTE_CELL` records (stages + 1,) and its cost.
 
     extra: (stages + 1, across) additional cost per m.
     bound: upper limit on the cost; more expensive routes are not searched.
-    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    check_stop: called after every `CELLS_PER_CHECK` cells; an exception raised there stops the search.
 
     Without a route, there are no records and the cost is inf.
     """
-    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
+    stages = max(1, CELLS_PER_CHECK // (grid.across.size * grid.layers.size))
     search: GridSearch = begin_route(data, frame, grid)
     while search.stage < grid.stages:
         search = continue_route(data, frame, grid, extra, bound, search, stages)
-        pause()
+        check_stop()
     cells, cost = extract_route(search)
     return cells, cost
 
@@ -681,21 +681,21 @@ def grid_route(
     grid: Grid,
     earlier_routes: tuple[GridRoute, ...] = (),
     expected_cost: float = math.inf,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
     """Return the cheapest route over a grid; None if terrain and ceiling block every route.
 
     earlier_routes: earlier routes; the cost is higher near them, so that the next route takes another side.
     expected_cost: upper limit on the cost with which the search is tried first, such as the cost on a coarser grid. If
         it fails, a search without a limit follows.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
     """
     if grid.layers.size == 0:
         return None
     along = np.linspace(0.0, frame.length, grid.stages + 1)
     extra = proximity_cost(along, grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):
-        cells, cost = cheapest_route(data, frame, grid, extra, bound, pause)
+        cells, cost = cheapest_route(data, frame, grid, extra, bound, check_stop)
         if cells.size:
             points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
             return GridRoute(points, float(cost))
@@ -725,14 +725,14 @@ def grid_routes(
     frame: RotatedFrame,
     span: tuple[float, float],
     grids: tuple[tuple[int, int], ...],
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Yield the routes of each grid, cheapest first.
 
     frame: frame of the direct line.
     span: smallest and largest offset of the cells across the line, m.
     grids: for each grid, its number of stages and its number of different routes.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:
@@ -740,7 +740,9 @@ def grid_routes(
         earlier_routes: tuple[GridRoute, ...] = ()
         for _ in range(route_count):
             # A second route costs more than the first.
-            route = grid_route(data, frame, grid, earlier_routes, math.inf if earlier_routes else expected_cost, pause)
+            route = grid_route(
+                data, frame, grid, earlier_routes, math.inf if earlier_routes else expected_cost, check_stop
+            )
             if route is None:
                 break
             if not earlier_routes:

@@ -463,8 +463,8 @@ SPACING_FACTOR = 1.1
 MAX_EXPANDED = 60_000
 # The same for guided searches. In 2,000 scenarios, those that led to a safe path expanded at most 2,100 states.
 MAX_GUIDED_EXPANDED = 20_000
-# States expanded between two calls of `pause`: some 10 ms.
-STATES_PER_PAUSE = 2000
+# States expanded between two calls of `check_stop`: some 10 ms.
+STATES_PER_CHECK = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
@@ -536,7 +536,7 @@ def cheapest_lattice_route(
     lattice: Lattice,
     max_turn: int,
     max_states: int,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
     *,
     is_guided: bool = False,
 ) -> tuple[Records, int]:
@@ -552,9 +552,9 @@ def cheapest_lattice_route(
     search = begin_lattice_search(data, frame, lattice, is_guided=is_guided)
     while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
         search = continue_lattice_search(
-            data, frame, lattice, max_turn, search, min(STATES_PER_PAUSE, max_states - search.expanded_count)
+            data, frame, lattice, max_turn, search, min(STATES_PER_CHECK, max_states - search.expanded_count)
         )
-        pause()
+        check_stop()
     if search.goal_state < 0:
         return np.zeros(0, dtype=LATTICE_CELL), search.expanded_count
     return trace_route(search.table.parents, search.goal_state, lattice), search.expanded_count
@@ -564,7 +564,7 @@ def lattice_route(
     data: ProblemArrays,
     frame: RotatedFrame,
     step: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
     *,
     is_guided: bool = False,
@@ -572,7 +572,7 @@ def lattice_route(
     """Find a route over a lattice; return its points, (k, 3) m, and the number of expanded states.
 
     step: spacing of the lattice, m.
-    pause: called after every `STATES_PER_PAUSE` states; an exception raised there stops the search.
+    check_stop: called after every `STATES_PER_CHECK` states; an exception raised there stops the search.
     max_states: maximum number of expanded states.
     is_guided: as in `begin_lattice_search`.
 
@@ -582,7 +582,7 @@ def lattice_route(
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
     max_turn = 2 if data.max_turn >= math.radians(90.0) else 1
     cells, expanded_count = cheapest_lattice_route(
-        data, frame, lattice, max_turn, max_states, pause, is_guided=is_guided
+        data, frame, lattice, max_turn, max_states, check_stop, is_guided=is_guided
     )
     if not len(cells):
         return np.empty((0, 3)), expanded_count
@@ -594,13 +594,13 @@ def lattice_route(
 
 
 def ceiling_route(
-    data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, check_stop: Callable[[], None] = lambda: None
 ) -> Floats:
     """Find a route at the altitude of the ceiling; return its world points, (k, 3) m; k is 0 for none.
 
     step: spacing of the lattice, m.
     depth: depth to which the route may enter the missiles' spheres, m.
-    pause: function called from time to time; an exception raised there stops the search.
+    check_stop: function called from time to time; an exception raised there stops the search.
 
     The spheres of missiles on the ground are narrowest at the ceiling. Only one layer is searched, which takes
     milliseconds. The climb to the ceiling at the start and the descent at the destination may therefore be too steep.
@@ -610,4 +610,4 @@ def ceiling_route(
         # Read-only like a scenario's ends: for a writable array the kernels would be compiled again.
         end.setflags(write=False)
     level_data = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-depth)
-    return lattice_route(level_data, frame, step, pause)[0]
+    return lattice_route(level_data, frame, step, check_stop)[0]

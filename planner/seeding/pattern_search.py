@@ -50,7 +50,7 @@ MIN_SCALE = 0.002
 
 
 # Number of evaluations between two calls of `must_end`: some 20 ms at most.
-EVALUATIONS_PER_PAUSE = 150
+EVALUATIONS_PER_CHECK = 150
 
 
 class _State(NamedTuple):
@@ -111,7 +111,7 @@ def search_patterns(
 
     vector: the path, (d,).
     evaluations: maximum number of evaluations.
-    must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; if it returns True, the search ends with its
+    must_end: called after every `EVALUATIONS_PER_CHECK` evaluations; if it returns True, the search ends with its
         present result.
 
     The vectors are the best feasible vector, if there is one, and the vector with the lowest merit, if it is another
@@ -128,8 +128,8 @@ def search_patterns(
     box, initial_steps = _Box(encoding.lower, encoding.upper), steps.copy()
     state: _State = _begin_search(data, frames, start, steps)
     while not state.is_done:
-        pause_count = min(evaluations, state.evaluations + EVALUATIONS_PER_PAUSE)
-        state = _continue_search(data, frames, box, moves, initial_steps, state, pause_count, evaluations)
+        next_check = min(evaluations, state.evaluations + EVALUATIONS_PER_CHECK)
+        state = _continue_search(data, frames, box, moves, initial_steps, state, next_check, evaluations)
         if not state.is_done and must_end():
             break
     if state.feasible_merit <= state.best_merit:
@@ -303,10 +303,10 @@ def _continue_search(
     moves: Floats,
     initial_steps: Floats,
     state: _State,
-    pause_count: int,
+    next_check: int,
     max_evaluations: int,
 ) -> _State:
-    """Continue a search up to `pause_count` evaluations, or to its end; return its state.
+    """Continue a search up to `next_check` evaluations, or to its end; return its state.
 
     moves, initial_steps: (k, d) moves and (k,) their initial sizes; a move that fails is tried in the other direction.
     state: its vectors are overwritten. The search ends at `max_evaluations`, or when all moves are too small.
@@ -323,7 +323,7 @@ def _continue_search(
             copy_into(round_start, best_vector)
         # The last trial of a round repeats the displacement of the whole round (pattern move).
         for k in range(move, moves.shape[0] + 1):
-            if evaluations >= pause_count and evaluations < max_evaluations:
+            if evaluations >= next_check and evaluations < max_evaluations:
                 return _State(
                     best_vector,
                     best_merit,

@@ -236,8 +236,8 @@ MAX_SAMPLES = 48
 EXTRA_MARGIN_M = 0.1
 # Maximum number of models per shortening.
 MAX_MODELS = ROUND_COUNT * (2 + STEPS_PER_ROUND * HALVINGS_PER_STEP)
-# Pairs of leg and missile between two calls of `pause`: some 5 ms.
-PAIRS_PER_PAUSE = 400_000
+# Pairs of leg and missile between two calls of `check_stop`: some 5 ms.
+PAIRS_PER_CHECK = 400_000
 
 
 def shorten_path(
@@ -246,7 +246,7 @@ def shorten_path(
     *,
     extra_margin: float = EXTRA_MARGIN_M,
     corners_too: bool = False,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
     """Shorten a path (w, 3), or reduce its violations or cost; return it and the number of evaluations.
 
@@ -254,7 +254,7 @@ def shorten_path(
 
     extra_margin: additional margin to spheres and ground, m.
     corners_too: True to also constrain the height and slope of corners as they are flown, which is slower.
-    pause: called after some milliseconds of work; an exception raised there stops it.
+    check_stop: called after some milliseconds of work; an exception raised there stops it.
 
     A model counts as one evaluation. Zones and the maximum height above ground are ignored.
 
@@ -270,14 +270,14 @@ def shorten_path(
     """
     mean_length = math.dist(path[0], path[-1]) / (len(path) - 1)
     samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_SPACING_M))))
-    rounds = max(1, PAIRS_PER_PAUSE // (len(path) * max(1, len(data.missiles.missiles))))
+    rounds = max(1, PAIRS_PER_CHECK // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
     shortening: Shortening = begin_shortening(data, start, samples, extra_margin, corners_too)
     while shortening.rounds < ROUND_COUNT:
         shortening = continue_shortening(data, shortening, extra_margin, min(ROUND_COUNT, rounds))
-        pause()
+        check_stop()
     return shortening.path, int(shortening.models)
 
 

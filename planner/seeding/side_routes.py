@@ -136,7 +136,7 @@ def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Reco
 
 
 class SideSearch(NamedTuple):
-    """Computation of `GridCosts` that can be continued after a pause: first forward, then backward.
+    """Computation of `GridCosts` that can be continued after a check_stop: first forward, then backward.
 
     step_layers: steepest climb and descent of a step, as `layers_per_step` returns them.
     cell_costs: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
@@ -154,23 +154,23 @@ class SideSearch(NamedTuple):
     stages_done: int
 
 
-# Number of cells reached between two calls of `pause`: some 10 ms.
-CELLS_PER_PAUSE = 100_000
+# Number of cells reached between two calls of `check_stop`: some 10 ms.
+CELLS_PER_CHECK = 100_000
 
 
 def grid_costs(
-    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, check_stop: Callable[[], None] = lambda: None
 ) -> GridCosts:
     """Compute the costs of the cheapest routes to each cell of a grid, and on to the destination.
 
     bound: upper limit on the cost of a whole route.
-    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    check_stop: called after every `CELLS_PER_CHECK` cells; an exception raised there stops the search.
     """
-    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
+    stages = max(1, CELLS_PER_CHECK // (grid.across.size * grid.layers.size))
     search: SideSearch = begin_grid_costs(data, frame, grid)
     while search.stages_done < 2 * grid.stages:
         search = continue_grid_costs(data, frame, grid, bound, search, stages)
-        pause()
+        check_stop()
     return search.costs
 
 
@@ -359,13 +359,13 @@ def side_routes(
     grid: Grid,
     bound: float,
     max_routes: int,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> list[GridRoute]:
     """Return routes that pass the obstacles on different sides, cheapest first.
 
     bound: upper limit on the cost.
     max_routes: maximum number of routes.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
 
     Each route is the cheapest that passes one obstacle on one side; the first route is the cheapest of all. Among
     routes close to each other, only the cheapest is returned.
@@ -373,7 +373,7 @@ def side_routes(
     if grid.layers.size == 0:
         return []
     step = frame.length / grid.stages
-    costs = grid_costs(data, frame, grid, bound, pause)
+    costs = grid_costs(data, frame, grid, bound, check_stop)
     obstacles = find_obstacles(data, frame, step, grid.shrink)
     passings = cheapest_passings(costs, grid, obstacles, step).ravel()
     passings = passings[np.isfinite(passings["cost"])]

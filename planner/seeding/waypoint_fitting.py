@@ -15,7 +15,7 @@ from planner.evaluation.airspace_scores import airspace_excess
 from planner.evaluation.encoding import Encoding, RotatedFrame, WaypointFrames, require_frames, straight_frames
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
 from planner.evaluation.problem import ProblemArrays
-from planner.evaluation.terrain_clearance import lag_length, segment_pixels, terrain_excess
+from planner.evaluation.terrain_clearance import clearance_deficit, lag_length, segment_pixels
 from planner.evaluation.threat_index import kill_density
 from planner.seeding.grids import KILL_COST
 from world.arrays import Floats, Ints
@@ -48,7 +48,7 @@ def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats
     depth_below = (
         _max_depth_below_leg(data, limits, ux, uy, horizontal_length, a[2], b[2]) if data.tracking.has_error else 0.0
     )
-    total += DEPTH_COST * terrain_excess(
+    total += DEPTH_COST * clearance_deficit(
         data.heights,
         data.slope_bounds,
         limits.required,
