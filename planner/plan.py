@@ -429,8 +429,6 @@ def parse_plan(
     >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
     Traceback (most recent call last):
     world.errors.MissionError: plan.json: schema: "planfly.plan/2": expected "planfly.plan/1" (and 11 more errors)
-
-    Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """
     try:
         data = json_value(text, parse_constant=_reject_constant)
@@ -473,6 +471,10 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
     terrain: file that replaces the scenario's terrain.
 
     Raises MissionError or the scenario's errors, also for a file that is missing, too large or not UTF-8.
+
+    >>> read_plan(Path("missing.json"))
+    Traceback (most recent call last):
+    world.errors.MissionError: missing.json: cannot be read: No such file or directory
     """
     try:
         text = read_small_file(path, MAX_BYTES, "plan", MissionError).decode("utf-8")

@@ -20,12 +20,21 @@ class DifferentialEvolution(BoxSearch):
     The arguments are the same as for `BoxSearch`. Trial vectors are made for half of the population at a time, so that
     a generation costs as much as with the estimation of distribution algorithms. samples and scores are the population,
     (n, d) and (n, c); empty before the first `tell`.
+
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = DifferentialEvolution(np.full(3, -2.0), np.full(3, 6.0), rank, 20, np.random.default_rng(1))
+    >>> for generation in range(120):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-3)
+    True
     """
 
     _generation = 0
 
     def tell(self, scores: Floats) -> None:
-        """Replace the target vectors that rank worse than or equal to their trial vectors, and make new trial vectors.
+        """Replace target vectors that do not rank better than their trial vectors, and make new trial vectors.
 
         scores: (n, c) scores of the last trial vectors. The first scores belong to the first population, which replaces
             nothing.

@@ -19,6 +19,15 @@ class Emna(Umda):
     """UMDA with one multivariate Gaussian instead of independent Gaussians.
 
     The arguments are the same as for `planner.optimisers.umda.Umda`; `basis` and `floor` are unused.
+
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = Emna(np.full(3, -2.0), np.full(3, 6.0), rank, 60, np.random.default_rng(1))
+    >>> for generation in range(30):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-6)
+    True
     """
 
     def _sample(self, count: int) -> Floats:

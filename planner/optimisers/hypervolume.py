@@ -82,7 +82,7 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 
 @compiled
 def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
-    """Mark the probes that each point dominates: [i, j] is 1 if point i dominates probe j, otherwise 0, (n, p).
+    """Mark the probes that each point dominates, (n, p): [i, j] is 1 if point i dominates probe j, else 0.
 
     points: (n, m) objectives of each point.
     probes: (m, p) objectives of each probe. A point at or below a probe in every objective dominates it.

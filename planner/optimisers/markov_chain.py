@@ -21,6 +21,15 @@ class MarkovChain(Umda):
 
     The arguments are the same as for `planner.optimisers.umda.Umda`; `basis` and `floor` are unused. The number of
     variables is a multiple of `GROUP`; each group of consecutive variables depends on the previous group only.
+
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = MarkovChain(np.full(6, -2.0), np.full(6, 6.0), rank, 400, np.random.default_rng(1))
+    >>> for generation in range(30):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-4)
+    True
     """
 
     GROUP = 3

@@ -187,13 +187,6 @@ class Multistart(BoxSearch):
     ...     search.tell((samples**2).sum(axis=1)[:, None])
     >>> bool(search.scores.min() < 1e-6)
     True
-
-    The arguments are the same as for `BoxSearch`; population is the largest generation, reached after many starts.
-    First samples, if given, are evaluated first, and the mean and the deviations of their better half replace the
-    centre of the box and its scale.
-
-    samples and scores are the best sample of all and the last generation, (n, d) and (n, c), best first; empty before
-    the first `tell`.
     """
 
     def __init__(
@@ -278,8 +271,8 @@ class Multistart(BoxSearch):
         """Return True if a search may continue at once with another slice of evaluations.
 
         It must be in the better half of the searches that have reached the same width, by their results at that width.
-        The best search of all always waits for its turn, because half of the evaluations go to it anyway. A search also
-        waits if it is done, is the only one, or has used more than `MAX_EVALUATION_FRACTION` of all evaluations.
+        The best search of all always waits for its turn, so that half of the evaluations go to other searches. A search
+        also waits if it is done, is the only one, or has used more than `MAX_EVALUATION_FRACTION` of all evaluations.
 
         The width and the best scores of the search are added to its curve, unless it has found nothing yet.
         """

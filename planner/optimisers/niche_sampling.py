@@ -77,7 +77,7 @@ class NicheSampling:
     def draw_next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
     ) -> Floats:
-        """Return the next samples (g, count, d): the elite, the best sample of each niche, and new ones around them.
+        """Return the next samples (g, count, d): elite, best sample of each niche, and new ones around them.
 
         rows: (g, n, d) samples.
         costs: (g, n) costs of the samples.

@@ -249,7 +249,7 @@ def _later_candidate_count(first_count: int) -> int:
 
 
 def _limit_generations(search: Search, generations: int) -> int:
-    """Return the requested number of generations, or the maximum of `run_waypoint_generations` if that is lower."""
+    """Return the requested number of generations, at most the maximum of `run_waypoint_generations`."""
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
@@ -270,7 +270,10 @@ def may_try_again(search: Search) -> bool:
 
 
 def _count_attempt_legs(search: Search) -> int:
-    """Return the number of legs between the candidates of neighbouring intervals in all generations of a first attempt."""
+    """Return the number of legs between candidates of neighbouring intervals that a first attempt evaluates.
+
+    The legs of all generations are counted, without the savings of a bound on the cost.
+    """
     settings = search.problem.scenario.planner
     first_count = _first_candidate_count(search, settings.population)
     candidate_pairs = (
@@ -286,7 +289,7 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Find the best path through each waypoint of some paths (k, w, 3), also by joining waypoints of different paths.
+    """Find the best path through each waypoint of some paths (k, w, 3), also across different paths.
 
     slack: fraction by which the first bound exceeds the cost of the best safe path, if there is one.
 

@@ -42,6 +42,11 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
 
     part: a name in `PARTS`, or `FRONT`; KeyError is raised for any other.
     scenario, limits: any small problem; the results are discarded.
+
+    >>> from planfly.workflow.uav import load_uav
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> call_kernels("paper", scenario, load_uav(scenario).limits)
     """
     problem = make_problem(scenario, limits)
     space, data = problem.space, problem.search

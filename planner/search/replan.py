@@ -1,4 +1,4 @@
-"""Replan in flight: keep the flown legs and plan the rest again around newly known threats."""
+"""Replan in flight: keep the flown legs, and plan the rest again around newly known threats."""
 
 import math
 from collections.abc import Callable
@@ -42,11 +42,12 @@ def replan(
 ) -> Plan:
     """Plan again from the start of leg `leg` of an old plan; keep the legs before it, which are flown.
 
-    scenario: includes the threats known now (`world.scenario.with_threats`). The turn at the first new waypoint is
-    measured from the course of the last flown leg. The search starts from the rest of the old plan, in addition to its
-    grid routes. The certificate is for the path ahead, the violations and objectives are for the whole path.
-
+    scenario: the scenario with the threats known now (`world.scenario.with_threats`).
     settle: function that completes the plan of the path ahead, before the flown legs are prepended.
+
+    The turn at the first new waypoint is measured from the course of the last flown leg. The search starts from the
+    rest of the old plan and from its usual grid routes. The certificate is for the path ahead, the violations and
+    objectives are for the whole path.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
@@ -104,7 +105,7 @@ def replan(
 
 
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
-    """Raise MissionError if the ends of a plan are not the ends of a scenario.
+    """Raise MissionError if a plan and a scenario have different ends.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
