@@ -63,7 +63,7 @@ class WaypointChains(NamedTuple):
     legs: int
 
     def path_through(self, waypoint: int, candidate: int) -> Ints:
-        """Return which candidate of each waypoint the best path through a given candidate uses, (w,)."""
+        """Return the indices of the candidates on the best path through a given candidate, (w,)."""
         out = np.empty(len(self.cost), dtype=np.int64)
         out[waypoint] = candidate
         for i in range(waypoint, 0, -1):
@@ -85,7 +85,7 @@ def waypoint_chains(
     candidates: (w, k, 3) m; only the first candidate of each end is used.
     bound: upper limit on the cost of a path, m; paths above it are dropped, which saves time.
     check_stop: called after every `LEGS_PER_CHECK` legs; an exception raised there stops the work.
-    max_legs: maximum number of legs to evaluate; if it is not sufficient, no path is returned.
+    max_legs: maximum number of legs to evaluate; if it is not sufficient, all costs are inf.
     """
     count, width, _ = candidates.shape
     legs = np.zeros((count - 1, width, width))
@@ -271,13 +271,13 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path; else 0.
+    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path; 0 for other turns.
 
     previous_waypoint, waypoint, next_waypoint: (3,) m.
-    corners: scratch, one `CORNER` record.
+    corners: working memory, one `CORNER` record.
 
-    A missing leg length of 100 m costs as much as an excess of 1 rad; it costs at most as much as 10 rad. A corner at a
-    leg without length costs as much as 1 rad.
+    Each 100 m of missing leg length cost as much as an excess of 1 rad, up to 10 rad. A corner at a leg without length
+    costs as much as 1 rad.
     """
     ux = waypoint[0] - previous_waypoint[0]
     uy = waypoint[1] - previous_waypoint[1]
