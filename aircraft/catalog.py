@@ -169,10 +169,10 @@ def find_aircraft(name: str) -> Aircraft:
 def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
     """Return the aircraft that a setup or log names.
 
-    Setups and logs contain only a name. For an aircraft of the user's own, the scenario states the folder to read.
-
     name: name of the aircraft in the setup or log.
     stated_name: name or folder of the aircraft in the scenario; a folder is read if its last part is `name`.
+
+    A setup or log contains only a name; the folder of a user's own aircraft is stated in the scenario.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -298,8 +298,10 @@ def copy_aircraft_folder(
 ) -> tuple[str, ...]:
     """Copy an aircraft into a new folder, and name it after the folder; create all files or none.
 
-    model: contents of the files of a model that JSBSim ships, by name, which are copied as well; None to refer to that
-        model only.
+    folder: the new folder.
+    source: the aircraft to copy.
+    model: contents of the model's files by name, for a model that JSBSim ships, which are copied as well; None to refer
+        to that model only.
     overwrite: True to replace the folder of an aircraft.
 
     Returns the sorted names of the created files. Raises FlightError as `check_new_folder` does, and OSError if the

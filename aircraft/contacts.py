@@ -83,11 +83,11 @@ def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return the ground contacts of an aircraft's model; default contacts if the model has none.
+    """Return the ground contacts of an aircraft's model, or default contacts if the model has none.
 
-    Contacts on which the aircraft stands come first.
+    gear: landing gear of the default contacts.
 
-    Raises ValueError for a model that is not XML.
+    Contacts on which the aircraft stands come first. Raises ValueError for a model that is not XML.
 
     >>> from aircraft.catalog import load_aircraft
     >>> [contact.name for contact in find_contacts(load_aircraft("c172x"), "belly") if contact.wheel]

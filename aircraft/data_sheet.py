@@ -273,7 +273,7 @@ def _is_within(value: float, min_value: float, max_value: float) -> bool:
 
 
 def check_sheet(sheet: DataSheet) -> DataSheet:
-    """Return a data sheet if its values are possible for a small aircraft.
+    """Return a data sheet unchanged if its values are possible for a small aircraft.
 
     Raises FlightError, with the allowed range, for a value out of range.
 
@@ -362,7 +362,8 @@ class SizedAircraft:
     guessed: fields that were filled in.
     partial_climb: stated climb at less than full throttle, rad; NaN if none was stated. `sheet.climb` is the climb at
         full throttle.
-    climb_shortfall: difference of the stated climb and the model's at the same throttle, rad; 0 if the model has it.
+    climb_shortfall: stated climb minus the model's climb at the same throttle, rad; 0 if the model reaches the stated
+        climb.
     """
 
     numbers: ModelNumbers
@@ -378,8 +379,8 @@ def size_aircraft(
     """Build the model of an aircraft from its data sheet.
 
     title: title of the model; "" for a title from layout, mass and span.
-    aircraft_class: class of the aircraft; None takes the layout's class.
-    prior: drag, efficiency and avionics power by size.
+    aircraft_class: class of the aircraft; None for the class of the layout.
+    prior: drag, efficiency and avionics power as functions of the size.
 
     Raises FlightError for a stall speed or a sink rate out of range, and if no propeller gives the stated climb and top
     speed.
@@ -559,7 +560,7 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
 def _match_sink(
     sheet: DataSheet, aero: AeroCoefficients, sink: float, idle_drag: float = 0.0
 ) -> tuple[AeroCoefficients, Drag]:
-    """Return the coefficients whose minimum drag matches a sink rate, and their drag function.
+    """Adjust the minimum drag to a sink rate; return the new coefficients and their drag function.
 
     sink: sink rate at cruise with the power off, m/s.
     idle_drag: drag of the idle propeller, N; 0 for a folded propeller. If the drag that remains for the wing is too
@@ -602,11 +603,12 @@ def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tu
     sheet: the sheet with missing values filled in.
     drag: function that returns the drag in level flight (N) at an airspeed (m/s).
 
-    Returns the motor or engine, and the sheet with its performance. Raises _NoPropellerError if no propeller meets the
-    sheet.
+    Returns the motor or engine, and the sheet with the climb and top speed that it gives. Raises _NoPropellerError if
+    no propeller meets the sheet.
 
-    A climb at reduced throttle may imply a climb at full throttle beyond `MAX_CLIMB`. A higher top speed, if it is only
-    guessed, then keeps the stated climb; otherwise the climb at full throttle is this limit.
+    A stated climb at reduced throttle may imply a climb at full throttle above `MAX_CLIMB`. Higher top speeds are then
+    tried if the top speed is only guessed, to keep the stated climb; otherwise the climb at full throttle is set to
+    `MAX_CLIMB`.
     """
     size_function = _size_engine if sheet.burns_fuel else _size_motor
     propulsion, result = size_function(stated_sheet, sheet, drag)
@@ -814,10 +816,10 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return a motor's thrust divided by the thrust that a field of the sheet requires, minus 1.
+    """Return the relative error of a motor's thrust against the thrust that a field of the sheet requires.
 
-    field: field of the sheet. "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`, and
-        "trim_throttle" requires the drag at that throttle.
+    field: "top" requires a thrust at top speed and full throttle, "climb" at cruise and `DataSheet.climb_throttle`, and
+        "trim_throttle" requires the drag of level flight at that throttle.
     """
     speed = sheet.top if field == "top" else sheet.cruise
     throttle = {"trim_throttle": sheet.trim_throttle, "climb": sheet.climb_throttle}.get(field, 1.0)
@@ -919,7 +921,7 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
 
 
 def _with_performance(sheet: DataSheet, motor: Motor, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb angle and the top speed that the aircraft reaches with a motor.
+    """Return the sheet with the climb angle and the top speed that a motor gives the aircraft.
 
     Raises _NoPropellerError if the climb angle is below the minimum in `RANGES`.
     """

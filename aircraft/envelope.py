@@ -20,7 +20,7 @@ POWERS = ("power_idle", "power_level", "power_full")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelope:
-    """Limits of steady flight from trims, relative to the air mass.
+    """Limits of steady flight relative to the air mass, computed from trims.
 
     aircraft, model_hash: name and hash of the aircraft's model.
     motor_braking: True if the propeller may drive the motor in a descent.
@@ -33,13 +33,13 @@ class Envelope:
     power_idle, power_level, power_full: electric power, or heat of the fuel per second, at the steepest descent, in
         level flight and at the steepest climb, W, (v, h); shape (0, 0) if unknown.
     volts: battery voltage, V; 0 without a battery.
-    source: source of a model with uncertain slopes: "a data sheet"; "" if the slopes are certain.
+    source: where a model with uncertain slopes comes from, e.g. "a data sheet"; "" if the slopes are certain.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
     fastest_sd: standard deviation of the fastest level flight, m/s.
     power_sd: standard deviation of the logarithm of power.
     battery_guessed, climb_guessed, bank_guessed: True if the battery's energy, the steepest climb or the bank limit was
         not stated.
-    climb_shortfall: climb stated at the throttle limit minus the model's, rad; 0 if the model has it.
+    climb_shortfall: climb stated at the throttle limit minus the model's climb, rad; 0 if the model reaches it.
     """
 
     aircraft: str

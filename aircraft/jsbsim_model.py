@@ -42,7 +42,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """Properties of a JSBSim model, and its kind.
+    """JSBSim properties through which planfly commands and reads an aircraft's model.
 
     shipped: name of the model among JSBSim's models; "" for a model file in the aircraft's folder.
     settles: True if the engine speed is a state of the model, which must settle before measurements.

@@ -401,7 +401,7 @@ def _axis_xml(axis: str, name: str, content: str, frame: str = "") -> str:
 
 
 def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the property of a factor as a tuple; () if the model does not have the factor."""
+    """Return the property of a factor as a tuple for `scale`; () if the model does not have the factor."""
     return (f"ident/{name}",) if name in factors else ()
 
 

@@ -1,7 +1,7 @@
 """Compute the limits of a path: the tighter of the scenario's limits and the aircraft's envelope.
 
-These are turn radii, turn lengths and slopes over the ground in wind. The compiled functions are their only definition,
-for the planner's candidates, for certificates and for missions.
+The limits are turn radii, turn lengths and slopes over the ground in wind. The planner's candidates, certificates and
+missions all use these compiled functions.
 """
 
 import math
@@ -101,7 +101,7 @@ class Limits:
         return float(climb), float(dive)
 
     def with_margin(self) -> "Limits":
-        """Return the limits with the envelope reduced for its uncertainty."""
+        """Return the limits with the envelope reduced by a margin for its uncertainty (`Envelope.with_margin`)."""
         return replace(self, envelope=self.envelope.with_margin())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
@@ -111,7 +111,7 @@ class Limits:
         amsl: altitude, m.
         airspeed: m/s; None for the airspeed of the limits.
 
-        It is the radius at the highest ground speed on the arc.
+        The radius is computed for the highest ground speed on the arc.
         """
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
@@ -222,7 +222,7 @@ def derate(
 
 
 def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
-    """Return the performance limited to maximum climb and sink rates, m/s; inf for no limit.
+    """Reduce climb and descent angles so that maximum climb and sink rates (m/s) are kept; inf for no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
     >>> slower = limit_rates(table, 5.0, math.inf)
@@ -456,7 +456,7 @@ def roll_reversal_length(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the length of leg (m) that the aircraft needs to roll from one turn into an opposite turn.
+    """Return the length of a leg (m) that the aircraft needs to roll from one turn into an opposite turn.
 
     ux, uy: unit vector of the leg's course.
     radius_in, radius_out: radii of the two arcs, m.

@@ -210,10 +210,10 @@ class ElectricMotor:
 class FuelEngine:
     """A piston engine on the propeller's shaft, with a torque proportional to the throttle.
 
-    torque: largest torque at sea level, N m; it falls with the air density.
+    torque: largest torque at sea level, N m; it decreases with the air density.
     friction: friction torque of the idle engine, N m.
     efficiency: ratio of shaft work to the fuel's heat.
-    windmill: see `ElectricMotor`.
+    windmill: as in `ElectricMotor`.
     """
 
     propeller: Propeller
@@ -334,13 +334,14 @@ class ActuatorDisc:
 
 @dataclass(frozen=True, slots=True)
 class ShaftPower:
-    """A propeller whose shaft power follows the throttle.
+    """A propeller whose shaft power is a function of the throttle.
 
     Its thrust and power coefficients are polynomials in J.
 
     diameter: m.
-    thrust, power: coefficients of CT and CP by rising power of J.
-    shaft: coefficients of the shaft power, W, by rising power of the throttle; a negative result counts as 0.
+    thrust, power: coefficients of CT and CP, in the order of increasing power of J.
+    shaft: coefficients of the shaft power, W, in the order of increasing power of the throttle; a negative shaft power
+        is replaced by 0.
     efficiency: motor efficiency, shaft power over battery power.
     volts: V.
     """

@@ -41,8 +41,8 @@ class TrackingError:
     airspeed: equivalent airspeed command, m/s; the true airspeed increases with altitude.
     acceptance: acceptance radius at which the autopilot deviates least from the legs at a corner, m.
     excursion: maximum distance from the legs near the corner with that acceptance radius, m.
-    before, after: lengths of the legs before and after the corner on which the deviation exceeds the deviation on a
-        straight leg, m.
+    before, after: lengths of the legs before and after the corner on which the deviation is larger than on a straight
+        leg, m.
     across, up: lateral and vertical deviation from a straight leg, m, including navigation error.
     lag: time by which the altitude lags behind a slope, s.
     step: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown as a step.
@@ -170,10 +170,9 @@ CORRIDOR_RADII = 2.0
 def corridor_half_width(stated_half_width: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
-    It is the value that the scenario states. Otherwise it is computed from the autopilot's acceptance radius.
-
-    stated_half_width: the scenario's `[limits] corridor_m`; None if not stated.
-    acceptance_radius: default acceptance radius of the autopilot, m; None for guidance that flies corners as planned.
+    stated_half_width: the scenario's `[limits] corridor_m`, which is returned; None if not stated.
+    acceptance_radius: default acceptance radius of the autopilot, from which the half-width is computed otherwise, m;
+        None for guidance that flies corners as planned.
 
     >>> corridor_half_width(None, None), corridor_half_width(None, 90.0), corridor_half_width(12.0, 90.0)
     (30.0, 180.0, 12.0)

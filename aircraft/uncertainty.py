@@ -72,7 +72,7 @@ class UncertainQuantity:
     name: name of the property.
     unit: "factor", or the unit of an offset.
     estimate, sd: estimate and standard deviation; for a factor, the median and the standard deviation of its logarithm.
-    reason: source of the deviation, for a person.
+    reason: why the property is uncertain, as a text for users.
     """
 
     name: str
@@ -86,7 +86,7 @@ class UncertainQuantity:
 class Uncertainty:
     """Uncertainty of an aircraft.
 
-    source: source of the model: "a data sheet", "flight logs".
+    source: where the model comes from: "a data sheet" or "flight logs".
     climb_sd, descent_sd: standard deviations of the steepest climb and descent at cruise, rad.
     quantities: uncertain properties of the model.
     power_sd: standard deviation of the logarithm of the power in flight.
@@ -94,7 +94,7 @@ class Uncertainty:
     battery_guessed: True if the battery's energy was not stated.
     climb_guessed: True if the steepest climb was not stated.
     bank_guessed: True if the bank limit was not stated.
-    climb_shortfall: climb stated at the throttle limit minus the model's, rad; 0 if the model has it.
+    climb_shortfall: climb stated at the throttle limit minus the model's climb, rad; 0 if the model reaches it.
     """
 
     source: str
@@ -247,11 +247,11 @@ class Draws:
     source: str = ""
 
     def row(self, seed: int) -> int:
-        """Return the row of the draw that a flight with a seed uses."""
+        """Return the row number of the draw for a flight with a seed."""
         return seed % len(self.values)
 
     def properties(self, seed: int) -> tuple[tuple[str, float], ...]:
-        """Return the names and values of the properties in the draw that a flight with a seed uses."""
+        """Return the names and values of the properties in the draw for a flight with a seed."""
         return tuple(zip(self.names, self.values[self.row(seed)].tolist(), strict=True))
 
 

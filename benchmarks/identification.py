@@ -25,7 +25,7 @@ import numpy as np
 import planfly
 from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.draws import draw_aircraft, draw_drive_power
+from aircraft.identification.draws import draw_aircraft, sample_power_factors
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.parameters import NAMES, PARAMETERS
 from aircraft.identification.performance import performance
@@ -170,7 +170,7 @@ def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]
         "sink_percent": 100.0 * (best.sink[1] / best.sink[0] - 1.0),
         "power_percent": 100.0 * (best.power[1] / best.power[0] - 1.0),
         "sink_inside": within(best.sink, drawn.sink),
-        "power_inside": within(best.power, drawn.power * draw_drive_power(estimate)),
+        "power_inside": within(best.power, drawn.power * sample_power_factors(estimate)),
         "drag_percent": 100.0 * (best.drag[1] / best.drag[0] - 1.0),
         "inside": int((off < 1.96).sum()),
         "outside": [name for name, one in zip(NAMES, off, strict=True) if one >= 1.96],

@@ -19,7 +19,7 @@ import numpy as np
 
 import planfly
 from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
-from aircraft.identification.draws import draw_aircraft, draw_drive_power
+from aircraft.identification.draws import draw_aircraft, sample_power_factors
 from aircraft.identification.estimate import estimate_model
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_means
 from aircraft.identification.performance import performance
@@ -128,7 +128,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
             (own / f"{own.name}.xml").write_text(files[f"{own.name}.xml"], encoding="utf-8")
             (own / f"{own.name}.toml").write_text(table, encoding="utf-8")
             drawn = performance(numbers, draw_aircraft(estimate), wing.airspeed, DENSITY)
-            spans = (np.degrees(drawn.climb), np.degrees(drawn.sink), drawn.power * draw_drive_power(estimate))
+            spans = (np.degrees(drawn.climb), np.degrees(drawn.sink), drawn.power * sample_power_factors(estimate))
             ends = [np.percentile(values, [2.5, 97.5]) for values in spans]
             values = np.array([truth.get(key, prior) for key, prior in zip(NAMES, prior_means(), strict=True)])
             off = np.abs(estimate.values - values) / estimate.sds

@@ -20,7 +20,7 @@ import numpy as np
 import planfly
 from aircraft.catalog import find_aircraft
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.draws import draw_aircraft, draw_drive_power
+from aircraft.identification.draws import draw_aircraft, sample_power_factors
 from aircraft.identification.estimate import estimate_model, score_predictions
 from aircraft.identification.flight_record import FlightRecord
 from aircraft.identification.performance import performance
@@ -70,7 +70,7 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
     unknown = [replace(record, current=np.full_like(record.current, np.nan)) for record in records]
     without_current = estimate_model(unknown, numbers)
     powers = performance(numbers, draw_aircraft(without_current), THOR_AIRSPEED_MPS, DENSITY).power
-    powers = powers * draw_drive_power(without_current)
+    powers = powers * sample_power_factors(without_current)
     low, middle, high = np.percentile(powers, [2.5, 50.0, 97.5]).tolist()
     rows: dict[str, object] = {
         "inside": {band.name: round(band.inside, 3) for band in predicted.bands},

@@ -80,26 +80,26 @@ class Objectives(NamedTuple):
 class Certificate:
     """Result of the continuous check along the whole path, not only at six points per leg.
 
-    A margin is the smallest difference between a limit and the path's value; it is negative if, and only if, the path
-    violates the limit.  The limits include the margins that a plan keeps, as the lines of ``problems`` state them.
+    A margin is the smallest distance of the path from a limit; it is negative if, and only if, the path violates the
+    limit. The limits include the safety margins that every plan keeps, as the lines of ``problems`` state them.
 
-    For algorithms with graded violations, as the default, clearance, kill_distance, zone_distance and headroom are
-    measured at the worst position that is predicted for the autopilot.  To the side of a leg this is by its lateral
-    deviation, navigation error and excursion at corners; above or below the leg by its lag in altitude on slopes.  Its
-    vertical deviation on a level leg is part of the required margins.  For bounds all deviations are subtracted.  For
-    other algorithms, such as "umda" and "de-paper", nothing is subtracted: the margins are those of the legs and fly-by
-    arcs.  For given waypoints the algorithm of the scenario decides.
+    With graded violations, which the default algorithm has, clearance, kill_distance, zone_distance and headroom are
+    measured at the worst position that is predicted for the autopilot. To the side of a leg this position includes the
+    lateral deviation, the navigation error and the excursion at corners; above or below the leg it includes the
+    altitude lag on slopes. The vertical deviation on a level leg is part of the required margins. From bounds all
+    deviations are subtracted. Algorithms that count violations, such as "umda" and "de-paper", subtract nothing: their
+    margins are the margins of the legs and fly-by arcs. For given waypoints the algorithm of the scenario decides.
 
     turn: margin to the greatest course change, rad: the scenario's limit less 0.5 degrees, or 150 degrees for
-    ``max_turn_deg = "aircraft"``, which limits turns by the lengths of their legs.
-    available_length: smallest length that is left of a leg, m, after its turns, the roll between them and settling; or
-    after 5 m for a leg that need not contain its turns.
+        ``max_turn_deg = "aircraft"``, which limits turns by the lengths of their legs.
+    available_length: smallest spare length of a leg, m: its length minus the length that its turns, the roll between
+        them and settling need, or minus 5 m for a leg that need not contain its turns.
     slope: margin to the limits of climb and dive less 0.5 degrees, rad.
     clearance: smallest height above ground minus the required clearance and its margin, m; NaN off the terrain.
     bounds: margin to map, floor and ceiling, m.
     kill_distance: distance from the nearest missile sphere, m; negative inside, inf without missiles.
     zone_distance: distance outside exclusions and inside inclusions, minus the required distance, horizontal or
-    vertical, m; inf without zones.
+        vertical, m; inf without zones.
     headroom: maximum height above ground minus the greatest height and its margin, m; inf without a maximum.
     problems: one line per failure, empty if the path is certified.
     path_digest: `path_digest` of the certified path; "" if unknown.
@@ -123,7 +123,7 @@ class Certificate:
 
     @property
     def margins(self) -> tuple[float, ...]:
-        """Margins of the path in the order of the fields, from `turn` to `headroom`, without `problems`, (8,)."""
+        """The eight margins in the order of the fields, from `turn` to `headroom`, without `problems`."""
         return (
             self.turn,
             self.available_length,
@@ -137,7 +137,7 @@ class Certificate:
 
 
 def path_digest(waypoints: Floats) -> str:
-    """Return a digest that identifies a path (w, 3); a certificate states the digest of its path.
+    """Return a digest of a path (w, 3), by which a certificate names the path it belongs to.
 
     >>> path_digest(np.zeros((2, 3))) == path_digest(np.ones((2, 3)))
     False
@@ -231,9 +231,9 @@ class Plan:
 
     @property
     def unmet_margins(self) -> tuple[str, ...]:
-        """Margins of the planner that given waypoints do not meet; empty for a plan that was searched.
+        """Margins of the planner that given waypoints do not keep, one line each; empty for a searched plan.
 
-        The distance from missiles is among them, a problem of a departure or an approach is not. A verdict on given
+        They include the distance from missiles, but not the problems of a departure or an approach. A verdict on given
         waypoints judges the flight itself, which may be flyable without these margins.
         """
         if self.algorithm != GIVEN_WAYPOINTS:
@@ -243,9 +243,9 @@ class Plan:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Problems that make every flight of the plan not flyable.
+        """Problems that make the plan not flyable.
 
-        They are the problems of a searched path, of the departure and of the approach.
+        Given waypoints that do not keep the planner's margins may still be flyable; their unmet margins are left out.
         """
         unmet_margins = self.unmet_margins
         return tuple(problem for problem in self._problems if problem not in unmet_margins)
@@ -282,10 +282,10 @@ class Plan:
 
 
 def nearest_missile_text(plan: Plan) -> str:
-    """Return a line that names the missile that a plan's legs approach most closely, and the leg.
+    """Return a line on the missile that a plan's legs approach most closely.
 
-    The line states two distances: of the leg from the kill radius, and of the flight, which may be inside it because it
-    deviates from its legs.
+    The line names the missile and the leg. It states the distance from the leg to the kill sphere, and the distance
+    from the flight to the sphere, which may be negative because the flight deviates from its legs.
     """
     threats, waypoints = plan.scenario.threats, plan.waypoints
     starts, legs = waypoints[:-1, None], np.diff(waypoints, axis=0)[:, None]
@@ -322,7 +322,7 @@ class _CertificateFile(_Model):
     problems: list[str]
 
     def certificate(self, certified_path: Floats) -> Certificate:
-        """Return the certificate that the file states, for a path (w, 3), m."""
+        """Convert the entries of the file to the certificate of a path (w, 3), m."""
         return Certificate(
             turn=self.turn_margin_rad,
             available_length=_none_to_inf(self.turn_room_m),
@@ -418,17 +418,17 @@ def parse_plan(
 ) -> Plan:
     """Parse the plan in the text of a ``plan.json``.
 
-    source: origin of the text, which stands at the beginning of error messages.
+    source: where the text comes from, for error messages, such as the path of the file.
     base: folder to which the scenario's paths are relative.
     terrain: file that replaces the scenario's terrain.
-    ground: terrain already loaded (from a log); then no elevation file is opened.
-    is_stored: True for the plan of a log; then no forecast is opened.
+    ground: terrain that is already loaded, for example from a log; no elevation file is then opened.
+    is_stored: True for the plan of a log, for which no forecast is opened.
+
+    Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
 
     >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
     Traceback (most recent call last):
     world.errors.MissionError: plan.json: schema: "planfly.plan/2": expected "planfly.plan/1" (and 11 more errors)
-
-    Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """
     try:
         data = json_value(text, parse_constant=_reject_constant)
@@ -470,11 +470,11 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
 
     terrain: file that replaces the scenario's terrain.
 
+    Raises MissionError or the scenario's errors, also for a file that is missing, too large or not UTF-8.
+
     >>> read_plan(Path("missing.json"))
     Traceback (most recent call last):
     world.errors.MissionError: missing.json: cannot be read: No such file or directory
-
-    Raises MissionError or the scenario's errors.
     """
     try:
         text = read_small_file(path, MAX_BYTES, "plan", MissionError).decode("utf-8")
@@ -498,7 +498,7 @@ def _check_names(source: str, field: str, found_names: dict[str, Any], expected_
 
     source: name of the file.
     field: name of the object in the file.
-    found_names: the object.
+    found_names: the object, whose keys are checked.
     expected_names: the expected keys.
     """
     if sorted(found_names) != sorted(expected_names):

@@ -21,7 +21,7 @@ _Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClimbOut:
-    """Departure: launch at home, climb straight ahead to the take-off altitude, and waypoints to the plan.
+    """Departure: launch at home, straight climb to the take-off altitude, and waypoints to the plan's start.
 
     home: (3,) m, on the ground.
     course: launch course, rad clockwise from north.
@@ -43,14 +43,15 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent:
-    """Approach: waypoints from the plan's end to the line-up, a level leg, and a glide to the ground.
+    """Approach: waypoints from the plan's end to the line-up, which is a level leg, and a glide to the ground.
 
     waypoints: (n, 3) m, before the line-up.
-    final_waypoints: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
+    final_waypoints: (2, 3) m, both ends of the line-up, at one altitude on the landing course; the glide begins at the
+        second.
     point: (3,) m, the landing point on the ground.
     course: landing course, rad clockwise from north.
     slope: slope of the straight line from the end of the line-up to the landing point, m per m.
-    go_around: height above home at the end of the climb of a go-around, m.
+    go_around: height above home to which a go-around climbs, m.
     """
 
     waypoints: Floats

@@ -15,7 +15,7 @@ LLVM_MIN_FREE_BYTES = 192 * 2**20
 class AddressSpaceError(MemoryError):
     """Error for a limit that leaves too little address space for a library.
 
-    The machine is at fault, not a file.
+    It is caused by the machine's limits, not by an input file.
     """
 
 
@@ -42,7 +42,7 @@ class AddressSpaceGuard:
         self._limit = limit
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Leave the search for a module to other hooks; raise AddressSpaceError if too little address space is free."""
+        """Raise AddressSpaceError if too little address space is free; else let other hooks find the module."""
         required_bytes = LLVM_MIN_FREE_BYTES if name.startswith("llvmlite") else MIN_FREE_BYTES
         if not has_address_space(required_bytes):
             limit = f"{self._limit // 1024:,} kB of address space (ulimit -v)"

@@ -169,7 +169,7 @@ class ReturnRequirements:
     rtl_autoland: int | None = None
 
     def __post_init__(self) -> None:
-        """Lock the array."""
+        """Convert the rally points to a read-only array (n, 3)."""
         rally = np.array(self.rally, dtype=np.float64).reshape(-1, 3)
         rally.setflags(write=False)
         object.__setattr__(self, "rally", rally)

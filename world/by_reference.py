@@ -1,12 +1,12 @@
 """Named tuples that are passed to kernels as one pointer.
 
-Numba passes a named tuple as all of its numbers, and an array as seven: a problem of the planner is 174 numbers, which
-every call passes, every signature names and every inlined copy repeats.  They took a third of the compile time.  An
-instance of a class marked `by_reference` is laid out in memory once, when it is first passed to a kernel, and kernels
-read the fields that they need through a pointer.
+Numba passes a named tuple as all of its numbers, and an array as seven numbers. A problem of the planner consists of
+174 numbers, which are repeated in every call, every signature and every inlined copy, and took a third of the compile
+time. An instance of a class marked `by_reference` is laid out in memory once, when it is first passed to a kernel, and
+kernels read the fields that they need through a pointer.
 
-Kernels can only read such a tuple: they can neither make nor return it.  Its arrays are borrowed from the Python tuple,
-which outlives the call; they must not be returned either.
+Kernels can only read such a tuple: they can neither make nor return it. Its arrays are borrowed from the Python tuple,
+which outlives the call; kernels must not return them either.
 """
 
 import ctypes
@@ -62,7 +62,7 @@ def by_reference(cls: _Class) -> _Class:
 
     A kernel is a function that numba compiles. It reads the fields through the pointer. The fields must be numbers,
     arrays, records or named tuples of these. Records are copied when an instance is first passed to a kernel. Returns a
-    subclass.
+    subclass of the class.
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
@@ -79,7 +79,7 @@ def by_reference(cls: _Class) -> _Class:
 
 
 def _get_layout(value: Any) -> _Layout:
-    """Return the memory layout of an instance; it is made at the first call and stored in the instance."""
+    """Return the memory layout of an instance, which is made at the first call and stored in the instance."""
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
         tuple_type = _replace_references(typeof_impl.dispatch(tuple)(value, None))

@@ -69,6 +69,6 @@ COMPILE_TIMER = CompileTimer()
 
 
 def announce_compilation() -> None:
-    """Call the innermost callback of `notify_before_compiling`: a kernel will be compiled."""
+    """Call the innermost callback of `notify_before_compiling`, if any, before a kernel is compiled."""
     if _callbacks:
         _callbacks[-1]()

@@ -29,7 +29,7 @@ MAX_GRID_OFFSET_PIXELS = 0.01
 
 
 def tile_files(path: Path) -> list[Path] | None:
-    """Return the elevation files in a folder or virtual raster, by name; None for any other path.
+    """Return the elevation files in a folder or virtual raster, sorted by name; None for any other path.
 
     Raises TerrainError for a folder without elevation files, and for a virtual raster that cannot be read.
     """

@@ -48,7 +48,7 @@ class PlanflyError(Exception):
 
     @classmethod
     def at(cls, file: str | Path, field: str, value: Any, allowed: str, *, shown: str | None = None) -> Self:
-        """Make an error about one value in a file; its message names these four parts.
+        """Make an error about one value in a file; its message is "file: field: value: allowed".
 
         shown: text of the value in the message; None for its str(), "" to omit it.
 

@@ -76,7 +76,7 @@ _FOLDER_COMMANDS = {
 
 
 def missing_text(path: Path) -> str:
-    """Describe why a path is not a file: it does not exist, or it is a folder with certain contents.
+    """Describe why a path is not a plain file: it does not exist, or it is a folder with certain contents.
 
     >>> missing_text(Path("missing.plan")), missing_text(Path("/proc/self/task"))
     ('no such file', 'is a folder')
@@ -364,7 +364,11 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process_id: int) -> bool:
-    """Remove the folders that a killed process made by `temporary_folder`; return True if there were none.
+    """Remove the folders that a killed process made by `temporary_folder`.
+
+    process_id: number of the killed process.
+
+    Returns True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()

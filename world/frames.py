@@ -43,7 +43,7 @@ PolyMapRecord = Any
 
 @dataclass(frozen=True, slots=True)
 class GeoOrigin:
-    """The point on WGS84 where east = north = 0."""
+    """Origin of a map: the point on WGS84 where east = north = 0."""
 
     lat_deg: float
     lon_deg: float
@@ -83,9 +83,7 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
 
 
 def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
-    """Convert latitudes and longitudes in degrees to a plane in which areas equal those on WGS84.
-
-    Returns x and y, m.
+    """Convert latitudes and longitudes in degrees to an equal-area plane; return x and y, m.
 
     >>> x, y = to_equal_area(GeoOrigin(0.0, 8.0), np.array([0.0, 90.0]), np.array([188.0, 8.0]))
     >>> bool(abs(4.0 * abs(x[0] * y[1]) / 5.10065621724e14 - 1.0) < 1e-9)
@@ -178,7 +176,7 @@ class PolyMap:
     residual: float
 
     def __post_init__(self) -> None:
-        """Lock the coefficients."""
+        """Replace the record by a read-only copy."""
         locked = np.array([self.record], dtype=POLYMAP)
         locked.setflags(write=False)
         object.__setattr__(self, "record", locked[0])

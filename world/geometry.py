@@ -211,13 +211,15 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
 def window_exposure(
     begin_fraction: float, end_fraction: float, length2: float, dot: float, start2: float, scale: float
 ) -> float:
-    """Return the exposure of a part of a segment, averaged over the whole segment; see `segment_exposure`.
+    """Return the exposure on a part of a segment to a threat, averaged over the whole segment.
 
     begin_fraction, end_fraction: limits of the part, as fractions of the segment.
     length2: squared length of the segment, m^2.
     dot: dot product of the segment's vector and the vector from the centre to the segment's start.
     start2: squared distance of the start from the centre, m^2.
     scale: distance at which the exposure density is 1, m.
+
+    `segment_exposure` defines the exposure.
     """
     if length2 < 1e-12:
         return (end_fraction - begin_fraction) * scale**4 / max(start2, MIN_RANGE_M * MIN_RANGE_M) ** 2

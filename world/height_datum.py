@@ -59,7 +59,8 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
     """Determine the vertical datum of an elevation file, and its conversion to mean sea level.
 
     crs: the file's reference system, or None if unknown.
-    stated_datum: datum stated by the user, a `NamedDatum` or a number, which overrides the file's; None if not stated.
+    stated_datum: datum stated by the user, a `NamedDatum` or a number, which overrides the file's datum; None if not
+        stated.
 
     Raises ValueError for depths, and for heights above an ellipsoid if no geoid grid is installed.
     """

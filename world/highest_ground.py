@@ -71,9 +71,9 @@ def _fill_cells(
 
 @inner
 def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
-    """Raise the value of cell (i, j) to a height, if the height is larger or NaN.
+    """Raise the highest ground of cell (i, j) to a height if the height is larger or NaN.
 
-    max_heights: (rows, columns) values of the cells, m; updated. A cell outside the array is ignored.
+    max_heights: (rows, columns) highest ground in each cell, m; updated. A cell outside the array is ignored.
     """
     if (
         0 <= i < max_heights.shape[0]

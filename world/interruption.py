@@ -41,7 +41,7 @@ class _State:
 
     depth: number of open `delay_signals` blocks.
     pending_signal: signal that is delayed until these blocks end, 0 for no signal.
-    temporary_paths: existing temporary files and folders of this process.
+    temporary_paths: temporary files and folders of this process that exist and must be removed.
     """
 
     def __init__(self) -> None:

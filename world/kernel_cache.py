@@ -26,9 +26,11 @@ _IMPORT = re.compile(rb"((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import
 
 
 def kernel_sources(root: Path) -> dict[str, bytes]:
-    """Return the contents of all source files that define kernels or are imported by them, by path below ``root``.
+    """Return the contents of all source files on which kernels below ``root`` depend, by path below ``root``.
 
     root: folder of the packages.
+
+    These are the files that define kernels, and the files that they import, directly or not.
 
     >>> files = kernel_sources(Path(__file__).parents[1])
     >>> "world/terrain.py" in files, "logs/views/report/page.py" in files

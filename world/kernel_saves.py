@@ -1,8 +1,8 @@
 """Lock that lets only one process at a time save compiled kernels in a cache folder.
 
-Numba numbers the files of a kernel's compiled forms in an index, which it reads, extends and writes back.  Two
-processes that save forms of one kernel for different types at the same moment use the same number for both: from then
-on the index entry of one form leads to the other, and a process that loads it runs machine code for other types.
+Numba numbers the files of a kernel's compiled forms in an index, which it reads, extends and writes back. If two
+processes save forms of one kernel for different types at the same moment, both use the same number: the index entry of
+one form then leads to the file of the other, and a process that loads it runs machine code for other types.
 """
 
 import contextlib
@@ -25,8 +25,9 @@ LOCK_NAME = "saving.lock"
 class CacheWriteLock:
     """Lock of a cache folder, held from the end of a compilation until its kernel is saved.
 
-    Numba reports when it has compiled a kernel and when it releases the compiler, and saves in between.  It compiles
-    in one thread at a time, and compiles one kernel within another: releases by inner compilations are ignored.
+    Numba reports when it has compiled a kernel and when it releases its compiler lock, and saves the kernel in between.
+    It compiles in one thread at a time, and may compile one kernel within another: releases by inner compilations are
+    ignored.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -40,7 +41,7 @@ class CacheWriteLock:
         listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
     def _track_depth(self, step: int) -> None:
-        """Count the nested uses of numba's compiler lock by this thread; release the file lock after the outermost.
+        """Count the nested uses of numba's compiler lock by this thread; release the file lock after the last.
 
         step: 1 when the compiler lock is taken, -1 when it is released.
         """

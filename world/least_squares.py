@@ -1,7 +1,7 @@
 """Least squares with the same rounding on every machine.
 
 LAPACK and its BLAS choose their arithmetic by the processor, so that the last digits of a solution differ, and with
-them the track that starts from it.  Least-squares problems behind a plan or a flight are solved here instead.
+them every track computed from it. Least-squares problems behind a plan or a flight are solved here instead.
 """
 
 import numpy as np

@@ -13,7 +13,7 @@ from world.threats import Threats, threat_label
 
 
 def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
-    """Return the east and north that a table states in m, or in degrees, which are converted to m on the map."""
+    """Return the east and north that a table states, m; positions in degrees are converted to the map."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
     east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))

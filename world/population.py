@@ -1,7 +1,7 @@
 """Read a population raster, and find the population density in an area.
 
-Rasters of two kinds are common: people per cell (GHS-POP in Mollweide, WorldPop in degrees), and people per km2.  The
-area of a cell is that on the ellipsoid: its corners are projected onto an equal-area cylinder.
+Rasters of two kinds are common: people per cell (GHS-POP in Mollweide, WorldPop in degrees), and people per km2. The
+area of a cell is its area on the ellipsoid, computed by projecting its corners onto an equal-area cylinder.
 """
 
 import math
@@ -141,7 +141,7 @@ def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: B
 
 
 def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
-    """Raise PlanflyError unless a file has one band of numbers, a position on Earth, and people as its unit."""
+    """Raise PlanflyError unless an open raster has one band of numbers, a position on Earth, and people as its unit."""
     number_kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or number_kind not in "iuf":
         allowed = "a population raster has 1 band of numbers"

@@ -126,9 +126,9 @@ def earth_bulge(distance: Floats, length: float) -> Floats:
 def line_of_sight(terrain: Terrain, station: Floats, aircraft: Floats) -> bool | None:
     """Return True if the straight line between two antennas is clear of the ground; None if unknown.
 
-    The ground is interpolated bilinearly and raised by the bulge of the Earth. It is compared exactly, not at samples.
-
     station, aircraft: positions of the antennas, (3,) m.
+
+    The ground is interpolated bilinearly and raised by the bulge of the Earth. It is compared exactly, not at samples.
     """
     length = math.dist(station[:2], aircraft[:2])
     fractions = np.linspace(0.0, 1.0, max(1, math.ceil(length / STRAIGHT_PIECE_M)) + 1)

@@ -30,9 +30,11 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Return the signals with the airspeed scaled to fit the wind triangle.
+    """Scale the airspeed of the signals to fit the wind triangle.
 
-    The fields ``airspeed_factor`` and ``airspeed_sd`` state the scale and its standard deviation.
+    flow: flow angles of the signals.
+
+    The fields ``airspeed_factor`` and ``airspeed_sd`` of the result state the scale and its standard deviation.
     """
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)

@@ -1,8 +1,8 @@
 """Align the signals of a log in time: find the lags of the accelerometers and of the control surfaces.
 
-The accelerometers lag behind the gyros, and the surfaces behind their commands. With a specific force that is 0.1 s
-late no model explains a moment well, so the lags are estimated first: the lags and delays of the accelerometers and the
-servos are chosen to explain pitch, roll and yaw best. All other signals are then delayed like the accelerometers.
+The accelerometers lag behind the gyros, and the surfaces behind their commands. If the specific force is 0.1 s late, no
+model explains a moment well. Therefore the lags and delays of the accelerometers and the servos are estimated first, as
+those that explain pitch, roll and yaw best. All other signals are then delayed like the accelerometers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +84,7 @@ class Signals:
         return smoothed
 
     def thin(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Low-pass the signals, and return every ``step``-th row of each record.
+        """Low-pass the signals, and keep every ``step``-th row of each record.
 
         extra: further columns (n,) by name, which are thinned in the same way.
         """
@@ -214,11 +214,11 @@ _SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03, 0.02])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """Find the lags and delays (clocks) with the smallest misfit, by a grid and a simplex search.
+    """Find the lags and delays (`Clocks`) with the smallest misfit, by a grid and a simplex search.
+
+    misfit: function that returns the misfit between signals and model for given lags and delays.
 
     The simplex search (Nelder and Mead 1965) starts at the best point of the grid.
-
-    misfit: function that returns the misfit between signals and model for given clocks.
 
     >>> found = find_clocks(lambda clock: abs(clock.lag - 0.05) + abs(clock.delay - 0.03) + clock.servo_lag)
     >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)

@@ -1,11 +1,11 @@
 """Predict parts of a log that no estimate has used, as bands of 95 %, and count how often the flight is inside.
 
 The judged part of the log is cut into windows. Each window starts from the measured state and follows the logged
-controls. Forty flights of each window are simulated. Each of them uses another draw of the aircraft, and adds the
-errors of the central aircraft over a window of an earlier part of the log that is drawn at random. These blocks of
-errors contain gusts, sensor noise and errors of the model, with their growth over time and their correlation (a block
-bootstrap: Kunsch 1989; Politis and Romano 1994). Sensor biases, trim offsets and the gust filter also come from the
-earlier part. Nothing is fitted to the judged part.
+controls. Forty flights of each window are simulated. Each of them uses another draw of the aircraft. The prediction
+errors of the central aircraft (the estimate itself) over a random window of an earlier part of the log are added. These
+blocks of errors contain gusts, sensor noise and errors of the model, with their growth over time and their correlation
+(a block bootstrap: Kunsch 1989; Politis and Romano 1994). Sensor biases, trim offsets and the gust filter also come
+from the earlier part. Nothing is fitted to the judged part.
 """
 
 from collections.abc import Sequence
@@ -111,7 +111,7 @@ class Band:
 
     @property
     def is_informative(self) -> bool:
-        """True if the band is narrower than the band without a model (`unchanged`), or that is unknown."""
+        """True if the band is narrower than the band without a model (`unchanged`), or if `unchanged` is NaN."""
         return not self.half_width >= self.unchanged
 
     @property
@@ -193,10 +193,10 @@ class BlindPrediction:
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
         """Return the band of each of `QUANTITIES` in the judged windows.
 
-        Each draw predicts every window, and gets the prediction errors of a random window of the earlier part.  The
-        bands are those of `band_limits` for these predictions.
-
         draws: draws of the aircraft with which the windows are predicted.
+
+        Each draw predicts every window, and the prediction errors of a random window of the earlier part are added. The
+        bands are computed from these predictions by `band_limits`.
         """
         generator = np.random.default_rng(_SEED)
         blocks = generator.integers(len(self._errors), size=(len(draws), len(self._starts)))
@@ -218,9 +218,9 @@ class BlindPrediction:
         return tuple(bands)
 
     def _simulate_windows(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
-        """Simulate a window from each start row (w,), with the trims of the earlier part; return (w, k, q).
+        """Simulate a window from each start row (w,), with the trims of the earlier part.
 
-        The result holds the q `QUANTITIES` at the k samples of `_compared_rows` in each window.
+        Returns the q `QUANTITIES` at the k samples of `_compared_rows` in each window, (w, k, q).
         """
         values = prior_means()
         trims = Predictor(self._earlier, base, values, self._filters).trims.mean(axis=0)

@@ -1,9 +1,9 @@
 """Estimate drag and thrust together, from forward acceleration and, if logged, the battery's current.
 
 Level flight shows only the difference of thrust and drag; climbs, glides and other speeds show more, and the current
-shows most. Other uncertain properties of motor and accelerometer are estimated as well, within their ranges. The
-properties of the aircraft among them (the motor's resistance, the battery's voltage) are then folded into the
-parameters: the model does not contain them, and would otherwise have another thrust than measured.
+shows most. Other uncertain properties of motor and accelerometer are estimated as well, within their ranges. The model
+does not contain those of them that belong to the aircraft (the motor's resistance, the battery's voltage). They are
+therefore folded into the parameters: otherwise the model's thrust would differ from the measured thrust.
 """
 
 from dataclasses import dataclass
@@ -138,8 +138,9 @@ def fit_drag(
     uncertainty: uncertainty of the lift curve; None for a default.
 
     The fit also estimates nuisance parameters, some of which belong to the aircraft: resistance, idle current, voltage
-    and drag of the elevator. The returned five values replace these as well: used with the base model's resistance,
-    idle current, voltage and elevator drag, they give nearly the same forces and currents as the fit.
+    and drag of the elevator. Their effect is included in the five returned values: together with the base model's
+    resistance, idle current, voltage and elevator drag, these values give nearly the same forces and currents as the
+    fit.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
     thin_signals = forces.signals

@@ -18,11 +18,10 @@ _DRAWS_PER_AIRCRAFT = 20
 
 
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw joint samples of all parameters, within the bounds of the parameters, (count, n).
+    """Sample all parameters jointly, within the bounds of the parameters, (count, n).
 
-    If too few samples are within the bounds, samples that are clipped to the bounds complete them.
-
-    The n columns are `aircraft.identification.parameters.PARAMETERS`.
+    If too few samples are within the bounds, they are completed by samples that are clipped to the bounds. The n
+    columns are `aircraft.identification.parameters.PARAMETERS`.
     """
     generator = np.random.default_rng(seed)
     lower, upper = np.array([parameter.bounds for parameter in PARAMETERS]).T
@@ -34,10 +33,11 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
     return np.asarray(returned_samples)
 
 
-def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw factors on the battery power, (count,); all are 1 if the battery current was logged.
+def sample_power_factors(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
+    """Sample factors on the drive's battery power, (count,); all are 1 if the battery current was logged.
 
-    No other signal shows the propulsive efficiency, which varies by `EFFICIENCY_LOG_SD` among real aircraft.
+    If it was not logged, no signal shows the propulsive efficiency, which varies by `EFFICIENCY_LOG_SD` among real
+    aircraft.
     """
     if estimate.with_current:
         return np.ones(count)

@@ -78,7 +78,7 @@ class Estimate:
     equations: the fitted equations.
     shifts: change of the values (n,) for one standard deviation of each quantity that is held fixed, by its name.
     with_current: True if the battery's current was used.
-    dynamics: True if the moments were estimated; False if their parameters are the prior's.
+    dynamics: True if the moments were estimated; False if their parameters have the values of the prior.
     airspeed: ratio of true to measured airspeed from the wind triangle, and its standard deviation.
     seconds: length of the flight that was used.
     refinement: refinement of the moments; None if they were not estimated.
@@ -210,7 +210,7 @@ def score_predictions(
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """Add the covariance of the fits (n, n) and the covariance from the shifts (n,).
+    """Return the sum of the covariance of the fits (n, n) and the covariance that results from the shifts (n,).
 
     For lift and drag, a variance is limited to the variance of the prior.
 
@@ -251,8 +251,10 @@ def estimate_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[C
 def _log_unexplained(fit: Fit, lag: float) -> float:
     """Return the logarithm of the fraction of the moments' variance that a fit does not explain.
 
-    The residual and the moments are taken as they were before a first-order lag (s). The lag smooths them, and removes
-    fast motion that is badly explained. With the lag, the longest lag would always seem best.
+    lag: first-order lag of the accelerometers, s, whose effect on the residual and the moments is inverted first.
+
+    The lag smooths both and removes fast motion that is badly explained, so that without the inversion the longest lag
+    would always seem best.
     """
     hertz = GRID_HZ / MOMENT_THINNING
     residual, total = (

@@ -37,7 +37,10 @@ class FixedParameter:
         return self.level + (self.vertical_air / float(signals.airspeed.mean()) if self.vertical_air else 0.0)
 
     def applies(self, *, with_current: bool) -> bool:
-        """Return True if the quantity matters for a log, depending on whether the log has the battery current."""
+        """Return True if the quantity matters for a log.
+
+        with_current: True if the log has the battery's current.
+        """
         return with_current or not self.needs_current
 
 
@@ -119,7 +122,7 @@ def _noise_doubling(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Cha
 
 
 def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that increases the lag of the servos, and shortens their delay by the same time."""
+    """Return a function that increases the lag of the servos, and shortens their delay by the same time, s."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         """Return the signals with the changed lag and delay of the surfaces, and the model."""

@@ -13,7 +13,7 @@ GRID_HZ = 50.0
 
 @dataclass(frozen=True, slots=True)
 class FlightRecord:
-    """Part of a flight without a gap, as logged, without any correction of delays. SI and radians.
+    """Part of a flight without a gap, as logged, without any correction of delays; SI units and radians.
 
     time: (n,) s, `GRID_HZ` samples per second.
     acceleration: (n, 3) specific force of the accelerometers, body axes forward, right, down, m/s^2.
@@ -24,7 +24,7 @@ class FlightRecord:
     airspeed: (n,) true, m/s.
     density: (n,) kg/m^3.
     height: (n,) m AMSL.
-    controls: (n, 4) elevator, aileron, rudder (rad, positive as in the model) and throttle (0..1) as commanded.
+    controls: (n, 4) commanded elevator, aileron and rudder (rad, positive as in the model) and throttle (0..1).
     current: (n,) current from the battery, A; NaN for a log without current.
     voltage: (n,) voltage of the battery, V; NaN for a log without voltage.
     source: name of the log in texts.

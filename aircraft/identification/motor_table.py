@@ -55,7 +55,7 @@ class MotorTable:
         )
 
     def for_voltage(self, volts: float) -> "MotorTable":
-        """Return a motor with the same thrust and power for another battery voltage."""
+        """Return a motor for another battery voltage, with the same thrust and power."""
         return replace(self, voltage=volts, nominal=volts if self.nominal > 0.0 else 0.0)
 
     def thrust_and_current(

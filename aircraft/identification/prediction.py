@@ -78,10 +78,10 @@ class PredictedLog:
 class GustFilter:
     """Steady-state Kalman filter of the unmodelled moments about one axis.
 
+    The moments are taken as a first-order Gauss-Markov process.
+
     decay: factor by which the process decays over a sample.
     gain: fraction of an innovation that is attributed to the process; the rest is white noise.
-
-    The moments are taken as a first-order Gauss-Markov process.
     """
 
     decay: float
@@ -101,12 +101,12 @@ class GustFilter:
 class Predictor:
     """Predicts the motion in a log by a model, from measured states up to a second ahead.
 
-    It determines the trim offsets and the unmodelled moments in the log first.
+    It first determines the trim offsets and the unmodelled moments in the log.
 
     base, values: base model, and values of its parameters, (n,).
     filters: filters of roll, pitch and yaw; None for the filters with the smallest innovations.
     trims: (3,) trim offsets as angular accelerations, rad/s^2; None for the means over each record of the log.
-    with_flow: True to use the measured flow angles and airspeed at all times, for an estimate; False to predict them.
+    with_flow: True to use the measured flow angles and airspeed at all times; False to predict them, too.
     """
 
     def __init__(
@@ -348,7 +348,8 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
 def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]) -> PredictedLog:
     """Compare the predictions of a log with the measured values.
 
-    models: base model and parameter values by name. The result includes the predictions of the last model.
+    models: base model and parameter values by name. The predicted values of the last model are part of the result.
+
     The log is predicted by constant rates and by each model.
     """
     starts = prediction_starts(signals)

@@ -52,7 +52,7 @@ class PropellerDisc:
         )
 
     def for_voltage(self, volts: float) -> "PropellerDisc":
-        """Return a disc with the same thrust and power for another battery voltage."""
+        """Return a disc for another battery voltage, with the same thrust and power."""
         return replace(self, voltage=volts, nominal=volts)
 
     def thrust_and_current(

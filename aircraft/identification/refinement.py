@@ -147,7 +147,11 @@ def prediction_errors(
 ) -> Floats:
     """Return the measured minus the predicted angular rates, rad/s, (3, n, h).
 
-    The axes of the result are the rates of roll, pitch and yaw, the n starts, and the h predicted times.
+    starts: (n,) rows at which the predictions start.
+    filters: filters of the unmodelled moments about roll, pitch and yaw.
+    horizons: h times after which predictions are compared, s.
+
+    The first axis of the result is the rate: roll, pitch, yaw.
     """
     predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
     measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]

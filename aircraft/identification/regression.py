@@ -26,9 +26,9 @@ class Fit:
 
 
 def correlation_samples(residual: Floats, max_lag: int = 500) -> float:
-    """Return the correlation length of a series (n,), in samples.
+    """Return the correlation length of a series (n,), in samples; at most `max_lag` lags are examined.
 
-    It is the two-sided sum of the autocorrelation up to its first zero. This number of samples contains as much
+    It is the two-sided sum of the autocorrelation up to its first zero: this number of samples contains as much
     information as one independent sample.
 
     >>> round(correlation_samples(np.random.default_rng(1).normal(size=4000)))

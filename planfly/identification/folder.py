@@ -10,7 +10,7 @@ import numpy as np
 from aircraft.catalog import Aircraft, read_aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import NUISANCES
-from aircraft.identification.draws import DRIVE_POWER, draw_aircraft, draw_drive_power
+from aircraft.identification.draws import DRIVE_POWER, draw_aircraft, sample_power_factors
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.performance import GRAVITY, Performance, level_controls, max_level_speeds, performance
@@ -99,7 +99,7 @@ class Identified:
     @property
     def drive_power(self) -> Floats:
         """Factor on the battery's power in each draw, (512,)."""
-        return draw_drive_power(self.estimate, len(self.draws))
+        return sample_power_factors(self.estimate, len(self.draws))
 
     def aircraft_draws(self) -> Draws:
         """Return the draws as values of the model's properties.

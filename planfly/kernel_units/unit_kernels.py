@@ -52,7 +52,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         _CERTIFY_MODULE + "leg_slope_limits",
         _CERTIFY_MODULE + "missile_distance",
         _CERTIFY_MODULE + "turn_and_roll_lengths",
-        _CERTIFY_MODULE + "with_end_course_points",
+        _CERTIFY_MODULE + "add_end_course_points",
         "planner.evaluation.corners.fly_by_radii",
         "planner.evaluation.corners.settling_length",
     ),

@@ -1,8 +1,9 @@
 """Measure how deep legs penetrate zones, for the search, and how far a path is from zones, for the certificate.
 
-The search charges each leg the depth of its penetration times its length, computed from a zone's extent across and
-along the leg; for levels above ground the terrain is sampled. The certificate cuts the path near a zone into pieces so
-short that the heights apply to the positions, and measures their distances exactly for straight edges and circles.
+The search penalises a leg by the depth of its penetration times its length, computed from the zone's extent across and
+along the leg; for zone limits above ground the terrain is sampled. The certificate cuts the path near a zone into
+pieces so short that each has practically one height above ground, and measures their distances from straight edges and
+circles exactly.
 """
 
 import math
@@ -33,7 +34,7 @@ UNKNOWN_HEIGHT_BOUND = 9000.0
 
 
 class AltitudeBand(NamedTuple):
-    """Vertical range of a part of a path, m: altitudes are AMSL, heights are above the ground below it."""
+    """Vertical range of a part of a path, m: altitudes AMSL, and heights above the ground below it."""
 
     min_altitude: float
     max_altitude: float
@@ -53,14 +54,15 @@ def zone_penetration(
     error_below: float,
     error_above: float,
 ) -> float:
-    """Return how much the leg a-b violates zones and their margins: depth times length, m·km.
+    """Return how much the leg a-b violates all zones and their margins: depth times length, m·km.
 
-    In an exclusion the depth is the smaller one of the horizontal and the vertical depth. For an inclusion both the
-    horizontal and the vertical distance outside are added.
+    In an exclusion the depth is the smaller of the horizontal and the vertical depth. For an inclusion the horizontal
+    and the vertical distance outside are added.
 
     heights, to_pixel: ground heights, m, and the map from positions to their pixels.
-    sample_spacing: spacing of the ground samples for zone levels that are stated above ground, m.
-    a, b: (3,) ends of the leg, m. lateral_error, error_below, error_above: tracking error to the side, below and above.
+    sample_spacing: spacing of the ground samples for zone limits that are stated above ground, m.
+    a, b: (3,) ends of the leg, m.
+    lateral_error, error_below, error_above: tracking error to the side, below and above, m.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
@@ -108,7 +110,7 @@ def zone_penetration(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z with its margin, and the part of the line abreast of it.
+    """Return the depth of a line in exclusion z with its margin, and the part of the line next to the zone.
 
     required_distance: required distance from the zone, m.
 
@@ -131,9 +133,11 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return how far a line is outside inclusion z or too close to its edge: distance times length, m·km.
+    """Return how much a line violates inclusion z and its margin: distance outside times length, m·km.
 
     required_distance: required distance from the edge, on the inside, m.
+
+    The result is 0 for a line that keeps this distance everywhere.
     """
     view = view_shape(records, z, line, required_distance)
     if view.inside and view.distance >= required_distance:
@@ -154,8 +158,9 @@ def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_d
 def altitude_band(start_altitude: float, end_altitude: float, error_below: float, error_above: float) -> AltitudeBand:
     """Return the range of altitudes of a straight line, extended by the tracking error.
 
-    The range of heights above ground is left practically unlimited, as if the ground were unknown.
+    The range of heights above ground is practically unlimited, as for unknown ground.
 
+    start_altitude, end_altitude: altitudes of both ends, m.
     error_below, error_above: vertical tracking error, m.
     """
     min_altitude = min(start_altitude, end_altitude) - error_below
@@ -207,10 +212,10 @@ def _sampled_altitude_band(
 
 @inlined
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
-    """Return how far a range of altitudes is below a zone's floor or above its ceiling, m.
+    """Return how far altitudes are below a zone's floor or above its ceiling, m; negative between both.
 
-    The distance is negative between floor and ceiling. For an exclusion the altitude with the smallest distance counts,
-    because no altitude may be inside. For an inclusion the largest distance counts, because all must be inside.
+    For an exclusion the smallest distance in the range is taken, because no altitude may be inside the zone. For an
+    inclusion the largest distance is taken, because all altitudes must be inside.
     """
     floor_min, floor_max = band.min_altitude, band.max_altitude
     if zone.floor_above_ground:
@@ -298,7 +303,7 @@ def measure_zone_margin(
 
 @inner
 def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
-    """Update a `ZONE_MARGIN` record with the distances between a piece of the path and zone z.
+    """Update a `ZONE_MARGIN` record, which keeps the smallest margins, with the distances to zone z.
 
     zone: shape and altitude limits of the zone.
     required: required horizontal and vertical distances, m.
@@ -334,8 +339,9 @@ def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> 
 def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, max_distance: float) -> float:
     """Return the horizontal distance of the line a-b from the edge of zone z, m; negative in a violation.
 
-    The distance is positive for a line that is outside an exclusion or inside an inclusion. It is negative (or 0) for a
-    line that enters the exclusion, by its depth, or leaves the inclusion. Distances above `max_distance` may be inf.
+    This is the distance from the edge for a line outside an exclusion or inside an inclusion. It is minus the depth (or
+    0) for a line that enters the exclusion, and minus the distance of the further end for a line that leaves the
+    inclusion. A distance above `max_distance` may be returned as inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     view = view_shape(records, z, line, max_distance)

@@ -28,9 +28,10 @@ REQUIRED_MARGINS = record_dtype(("number", np.int64), "horizontal", "vertical", 
 
 @by_reference
 class ZonesWithMargins(NamedTuple):
-    """Zones in the kernels' order: the inclusions, then the exclusions from west to east.
+    """Zones in the order in which kernels visit them: inclusions, then exclusions from west to east.
 
-    records: the zones. required: `REQUIRED_MARGINS` records (z,) with their margins.
+    records: the zones.
+    required: `REQUIRED_MARGINS` records (z,) with their margins.
     inclusions: number of inclusions.
     max_horizontal: largest horizontal margin, m.
     """
@@ -42,10 +43,11 @@ class ZonesWithMargins(NamedTuple):
 
 
 class ZoneMargins(NamedTuple):
-    """Margins that a path keeps to every zone, m: horizontal and vertical as in `REQUIRED_MARGINS`.
+    """Margins that a path keeps to every zone, m.
 
-    end_fraction: if the start or the destination is closer to a zone than the margin, this fraction of its distance
-    replaces the margin of that zone.
+    horizontal, vertical: as in `REQUIRED_MARGINS`.
+    end_fraction: fraction of the distance between a zone and the start or destination that replaces the margin of this
+        zone if that end is closer than the margin.
     """
 
     horizontal: float
@@ -57,8 +59,10 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
     """Return zones with their required margins, reduced where a fixed end of the path violates a margin.
 
     ends: fixed ends of the path, (k, 3) m.
+    terrain: ground heights, for zone limits above ground; None if unknown.
+    margins: margins to every zone, before the reduction.
 
-    The margin is 0 for an exclusion that contains an end, and for an inclusion that does not.
+    The margin becomes 0 for an exclusion that contains an end, and for an inclusion that does not.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
@@ -94,8 +98,8 @@ def _reduce_margins(
     fraction: 0 to 1.
     required: `REQUIRED_MARGINS` records (z,), which are changed.
 
-    For an inclusion both margins are reduced. For an exclusion one of them is sufficient: the one of which the end has
-    the larger fraction.
+    For an inclusion both margins are reduced. An end must keep only one of the two margins of an exclusion, so only the
+    margin to which its distance is larger, in proportion, is reduced.
     """
     for z in range(required.shape[0]):
         zone, margin = records.zones[z], required[z]
@@ -117,7 +121,7 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
-    """Return the index of the first exclusion that may reach into an area whose western edge is `west`, m.
+    """Return the index of the first exclusion that may reach east of `west`, m.
 
     All exclusions before it end further west. It is found by bisection, because exclusions are sorted.
     """
@@ -140,9 +144,10 @@ class PlannerAirspace(NamedTuple):
 
     zones: exclusions and inclusions with their margins.
     max_height: maximum height above ground, inf for none.
-    buffer: margin below the maximum height; start_buffer, destination_buffer: margin at the ends.
-    depths: heights of the ground with the opposite sign. With them, staying below the maximum height is computed like
-    staying above the ground.
+    buffer: margin below the maximum height, away from the ends of the path.
+    start_buffer, destination_buffer: margin at the ends.
+    depths: negated heights of the ground. With them, staying below the maximum height is computed like staying above
+        the ground.
     """
 
     zones: ZonesWithMargins
@@ -235,12 +240,12 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
 
 @inner
 def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: float) -> ShapeView:
-    """Measure the shape of zone z as seen from a line: its distance, and its extent across and along.
+    """Measure the shape of zone z in the axes of a line: its distance, and its extent across and along.
 
     max_distance: m; a larger distance may be returned as inf.
 
-    The line is taken as an axis. The corners and edges of the shape are measured along it from its start, and across it
-    to the left. A line starts inside if the shape's edges cross the axis an odd number of times ahead of its start.
+    The corners and edges of the shape are measured along the line from its start, and across it to the left. The line
+    starts inside the shape if the shape's edges cross its axis an odd number of times ahead of its start.
     """
     zone = records.zones[z]
     if zone.round:

@@ -1,9 +1,9 @@
 """Measure zones and the maximum height above ground: violations for the search, margins for the certificate.
 
-A search adds to a path's scores the depth of its legs in zones (bounds) and their excess over the maximum height above
-ground (terrain), both in m·km; the paper's scores count pieces of legs instead. Each leg is first tested as a
-whole with the largest lateral deviation of the flight, corners included, and cut into parts only where that test fails.
-A certificate measures the distance from each zone and the maximum height above ground of every piece of the path.
+A search adds two amounts to a path's scores, both in m·km: the depth of its legs in zones (to bounds), and their height
+above the maximum height above ground (to terrain). The paper's scores count pieces of legs instead. Each leg is first
+tested as a whole with the largest lateral deviation of the flight, corners included, and cut into parts only if that
+test fails. A certificate measures the margins of every piece of the path.
 """
 
 import math
@@ -15,7 +15,7 @@ from planner.evaluation.certify_kernels import END_DISTANCE_M, TRACKED_PIECE, re
 from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii, half_blend_length
 from planner.evaluation.paper_scores import POINTS_PER_LEG
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_headroom
-from planner.evaluation.terrain_clearance import lag_at, segment_pixels, terrain_excess
+from planner.evaluation.terrain_clearance import clearance_deficit, lag_at, segment_pixels
 from world.arrays import Floats, Ints
 from world.kernels import Record, Records, compiled, copy_into, inlined, inner
 from world.terrain import segment_clearance
@@ -45,9 +45,8 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Measure the distance to zones and the height above ground of each piece of a path (w, 3).
 
-    Returns `AIRSPACE_PIECE` records, first of its legs, then of its corners.
-
-    The pieces are those of `tracked_pieces` for an autopilot with tracking error, and otherwise legs and chords.
+    Returns `AIRSPACE_PIECE` records, first of its legs, then of its corners. The pieces are those of `tracked_pieces`
+    for an autopilot with tracking error, and otherwise legs and chords of arcs.
     """
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
@@ -118,9 +117,7 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
     """Return the greatest height above ground of a flight along a piece, m; NaN off the terrain.
 
-    By the tracking error, the flight can be above the piece and to either side of it.
-
-    piece: `TRACKED_PIECE` record.
+    piece: `TRACKED_PIECE` record, with the tracking error by which the flight may be above or beside the piece.
     """
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
@@ -217,11 +214,11 @@ def airspace_excess(
 ) -> float:
     """Return how much a leg violates zones and the maximum height: depth times length, m·km.
 
-    It is the depth of the leg in zones plus its height above the maximum height, integrated along the leg.
+    The result is the depth of the leg in zones plus its height above the maximum height, integrated along the leg.
 
     start, end: (3,) ends of the leg, m.
     below, above: vertical tracking error, m.
-    max_excess: value beyond which the integration stops.
+    max_excess: value above which the integration stops; the result is then a lower bound, m·km.
     """
     total, across = 0.0, float(data.tracking.across)
     if data.airspace.zones.required.shape[0] > 0:
@@ -235,7 +232,7 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
-    """Return the depth of a leg in zones enlarged by the tracking error, times its length, m·km.
+    """Return the depth of a leg in zones that the tracking error enlarges, times the leg's length, m·km.
 
     start, end: (3,) ends of the leg, m.
     lateral, below, above: tracking error, m.
@@ -288,7 +285,7 @@ def _swath_excess_height(
     above: float,
     max_excess: float,
 ) -> float:
-    """Return the height of a line above the maximum height, integrated along it, m·km.
+    """Return the height of a strip along a line above the maximum height, integrated along the line, m·km.
 
     Three lines are measured: the line itself, and one line at the distance `lateral` on each side. The largest of the
     three results is returned.
@@ -297,7 +294,7 @@ def _swath_excess_height(
     start, end: (3,) ends of the line, m.
     lateral: half width of the strip that the flight may use, m.
     above: largest height of the aircraft above the line, m.
-    max_excess: value beyond which the computation stops; the result is then a lower bound above it. inf never stops.
+    max_excess: value above which the computation stops, m·km; the result is then a lower bound.
     """
     horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))
     east, north = lateral * (end[1] - start[1]) / horizontal_length, -lateral * (end[0] - start[0]) / horizontal_length
@@ -311,7 +308,7 @@ def _swath_excess_height(
         y2 = end[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
-        excess = terrain_excess(depths, bounds, required, above, ends, x, y, -start[2], x2, y2, -end[2], max_excess)
+        excess = clearance_deficit(depths, bounds, required, above, ends, x, y, -start[2], x2, y2, -end[2], max_excess)
         largest_excess = max(largest_excess, excess)
         if largest_excess > max_excess:
             break
@@ -333,8 +330,8 @@ def _cut_segment(
         end[axis] = leg_start[axis] + end_fraction * (leg_end[axis] - leg_start[axis])
 
 
-def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
-    """Return the number of pieces of each path that violate a zone or the maximum height, (n,).
+def count_airspace_violations(data: ProblemArrays, paths: Floats) -> Ints:
+    """Count the pieces of each path that violate a zone or the maximum height, (n,).
 
     paths: (n, w, 3) m.
 
@@ -349,7 +346,7 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
     >>> mill = ZoneTable(name="mill", kind="exclusion", east_m=1300.0, north_m=0.0, radius_m=100.0)
     >>> scenario = with_zones(load_scenario("tight"), [mill], "mills")
     >>> problem = make_problem(scenario, load_uav(scenario).limits)
-    >>> airspace_counts(problem.search, np.stack([scenario.start, scenario.destination])[None])
+    >>> count_airspace_violations(problem.search, np.stack([scenario.start, scenario.destination])[None])
     array([2])
     """
     return _count_pieces(data, np.ascontiguousarray(paths))
@@ -357,7 +354,7 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
 @compiled
 def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
-    """Implement `airspace_counts` for contiguous paths (n, w, 3)."""
+    """Implement `count_airspace_violations` for contiguous paths (n, w, 3)."""
     path_count, waypoints, _ = paths.shape
     counts = np.zeros(path_count, np.int64)
     piece_start, piece_end = np.empty(3), np.empty(3)

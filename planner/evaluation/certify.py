@@ -16,12 +16,12 @@ from aircraft.tracking import zero_tracking_error
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_pieces
 from planner.evaluation.certify_kernels import (
+    add_end_course_points,
     corner_excursions,
     heights_above_ground,
     leg_slope_limits,
     missile_distance,
     turn_and_roll_lengths,
-    with_end_course_points,
 )
 from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
@@ -45,7 +45,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     # Copy the array: a plan's waypoints are read-only, for which the kernels would be compiled again.
     waypoints = np.array(waypoints, dtype=np.float64)
     problems: list[str] = []
-    turns = turning_angles(with_end_course_points(data, waypoints))
+    turns = turning_angles(add_end_course_points(data, waypoints))
     problems += _summarise_faults(
         [
             (
@@ -111,10 +111,10 @@ def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 
 def required_kill_distance(problem: Problem) -> float:
-    """Return the distance from missile spheres that a search requires of a path, m.
+    """Return the distance from missile spheres that a path must keep, m.
 
-    The distance is the margin of the certificate. If an end is closer to a sphere than this, it is slightly less than
-    the distance of the end.
+    It is the margin of the certificate. If an end of the path is closer to a sphere, it is slightly less than the
+    distance of that end, because no path is further away than its ends.
     """
     # A path is never further from missile spheres than its own ends.
     ends = (problem.scenario.start, problem.scenario.destination)
@@ -128,7 +128,7 @@ def least_height(data: ProblemArrays, waypoints: Floats) -> float:
 
     waypoints: (w, 3) m.
 
-    No tracking error is subtracted.
+    The tracking error of the autopilot is ignored.
     """
     exact_data = data._replace(tracking=zero_tracking_error())
     return float(heights_above_ground(exact_data, np.array(waypoints, dtype=np.float64))["height"].min())
@@ -141,11 +141,11 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Describe all faults of one kind in one line, which is returned as a list; return [] without faults.
-
-    The line describes the worst fault, and names the places of the others.
+    """Describe all faults of one kind in one line; return [the line], or [] without faults.
 
     faults: margin, place and description of each fault.
+
+    The line describes the worst fault, and names the places of the others.
     """
     if not faults:
         return []
@@ -156,18 +156,18 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
 
 
 def _without_rounding(margin: float) -> float:
-    """Return a margin, or 0 if it is negative only because of rounding.
+    """Return 0 for a margin that is negative only because of rounding; return any other margin unchanged.
 
-    Therefore a margin below 0 always means a problem.
+    A margin below 0 therefore always means a problem.
     """
     return 0.0 if -_EPSILON <= margin < 0.0 else margin
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a leg's length, m; append legs that are too short to `problems`.
+    """Return the smallest spare length of a leg, m; append legs that are too short to `problems`.
 
-    Every leg needs a minimum length. If legs have to contain their turns, a leg also needs the lengths of its turns, of
-    settling between them, and of rolling from one bank to the other.
+    Every leg needs a minimum length. If legs have to contain their turns, a leg with turns also needs the lengths of
+    its turns, of settling between them, and of rolling from one bank to the other.
     """
     runs = leg_runs(waypoints)
     problems += _summarise_faults(
@@ -234,8 +234,10 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: float, place_text: str = "") -> str:
-    """Describe a slope that exceeds the climb limit or the dive limit (rad, positive up).
+    """Describe a slope that exceeds the limit of climb or dive.
 
+    slope: rad, positive for a climb.
+    climb, dive: the limits, rad.
     place_text: place on the path, such as `` along its arc``.
     """
     verb, limit, stated, rate = (
@@ -249,7 +251,7 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height of a path above the required height, m; append violations to `problems`.
+    """Return the smallest margin of a path to the required height, m; append violations to `problems`.
 
     The required height above ground is the clearance plus the buffer. The margin is NaN if the path leaves the terrain.
     """
@@ -282,16 +284,20 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 class _LowPlace(NamedTuple):
-    """Smallest margin to the required height, and smallest height above ground, of a leg or a turn, m."""
+    """Lowest place of a leg or a turn, m.
+
+    margin: smallest margin to the required height.
+    height: smallest height above ground.
+    """
 
     margin: float
     height: float
 
 
 def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Return two margins, m: the smallest to the required distance from a zone, and to the maximum height.
+    """Return the smallest margins to zones and to the maximum height, m; append violations to `problems`.
 
-    Both are inf if the scenario has neither zones nor a maximum height. Violations are appended to `problems`.
+    Both are inf if the scenario has neither zones nor a maximum height.
     """
     data, space = problem.certified, problem.certified.airspace
     if not is_limited(space):

@@ -59,8 +59,8 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Cut a path (w, 3) into straight pieces with bounds on the tracking error of the flight.
 
     Returns `TRACKED_PIECE` records, first of its legs, then of its corners. A leg is cut where its altitude lag has
-    decayed and near the fixed ends. A corner gives two pieces, a part of the leg before it and a part of the leg after
-    it, with the excursion of the flight there as an additional lateral deviation.
+    decayed and near the fixed ends. A corner gives two pieces: the part of the leg before it and the part of the leg
+    after it, with the excursion of the flight at the corner as an additional lateral deviation.
     """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
@@ -193,6 +193,7 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
 
     threats: records of the threats; those without a kill radius are ignored.
     start, end: (3,) ends of the segment, m.
+    min_distance: smallest distance found on other segments, m.
     """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length2 = dx * dx + dy * dy + dz * dz
@@ -214,7 +215,7 @@ _END_POINT_DISTANCE_M = 1e4
 
 
 @compiled
-def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
+def add_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
     """Add a point at each end of a path (w, 3), to measure the turns from and to the end courses.
 
     One distant point lies before the start, the other after the destination, both on the prescribed courses. Without a
@@ -244,8 +245,9 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
 
     waypoints: (w, 3) m.
 
-    Returns the turn lengths and the roll lengths, (w - 1,) m each. The roll lengths of fly-over waypoints are 0: such a
-    turn begins at its waypoint, and its turn length already extends to where the track has rejoined the next leg.
+    Returns the turn lengths and the roll lengths, (w - 1,) m each. The roll lengths of fly-over waypoints are 0: a
+    fly-over turn begins at its waypoint, and its turn length already extends to the point where the track has rejoined
+    the next leg.
     """
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
@@ -344,14 +346,14 @@ def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:
-    """Return the height required on a piece a-b in addition to the clearance, m.
+    """Return the height that a piece a-b requires in addition to the clearance, m.
 
     buffer: additional height away from the ends, m.
     end_buffers: additional heights at the start and the destination, m.
     a, b: (3,) ends of the piece, m.
 
-    From an end with a smaller buffer the required height grows with the distance, up to `buffer`. It grows half as fast
-    as in a search: the difference allows for the ground between the samples of the search.
+    If an end has a smaller buffer, the required height grows with the distance from that end, up to `buffer`. It grows
+    half as fast as in a search, which has to allow for the ground between its samples.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:

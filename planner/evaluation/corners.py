@@ -178,7 +178,8 @@ def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: 
     amsl: altitude of the leg, m.
     wind: downwind unit vector.
 
-    The length is 0 on the first and the last leg, between turns of the same direction, and next to an unflyable turn.
+    The length is 0 on the first and the last leg, between two turns to the same side, and next to a turn that cannot be
+    flown.
     """
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
@@ -197,7 +198,7 @@ ARC_STEP = math.radians(15.0)
 
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
-    """Return half the length of the parabola between two slopes, m per unit of slope change.
+    """Return half the length of the parabola that blends two slopes, m per unit of slope change.
 
     For a change of slope of 0.1 the parabola begins 0.1 times this length before the corner, and ends as far after it.
     A full tailwind is assumed.
@@ -212,7 +213,7 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 def fly_by_vertices(
     aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
-    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
+    """Return vertices (k, 3) that enclose the flight past `waypoint` from below, m.
 
     previous, waypoint, next_waypoint: (3,) m.
     radius: radius of the fly-by arc, m.
@@ -225,15 +226,16 @@ def fly_by_vertices(
 
 @inner
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
-    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
+    """Return vertices (k, 3) that enclose the flight past `waypoint` from below, m.
 
-    blend: half length of the parabola that blends two slopes (`half_blend_length`), m per unit of the slope's change.
-    previous, waypoint, next_waypoint: (3,) m. radius: radius of the fly-by arc, m; 0 for none.
+    blend: half length of the parabola that blends two slopes (`half_blend_length`), m per unit of slope change.
+    previous, waypoint, next_waypoint: (3,) m.
+    radius: radius of the fly-by arc, m; 0 for none.
 
     The first vertex is where the blend of slopes begins on the leg, the last one is where it ends on the next leg. The
-    points between lie on the arc, and their height changes linearly. Where the slope decreases, the flight cuts the
+    vertices between lie on the arc, and their height changes linearly. Where the slope decreases, the flight cuts the
     crest by (slope change) x (half length of the blend) / 4, and the vertices are lowered by this amount. Without a
-    radius, or if a leg is shorter than the tangent, the arc is the waypoint.
+    radius, or if a leg is shorter than the tangent, the waypoint takes the place of the arc.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
@@ -322,11 +324,11 @@ def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> 
 
 @compiled
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
-    """Return the radius of the fly-by arc at each waypoint, m, (w,).
+    """Return the radius of the fly-by arc at each waypoint, m, (w,); 0 where there is no arc.
 
-    The radius is 0 at the ends, without a turn, and at a fly-over turn, which passes outside its corner. If turns are
-    limited only by a maximum angle, a leg may be shorter than its two turns. Such arcs cannot be flown, and have the
-    radius 0. Their corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them.
+    There is no arc at the ends, without a turn, and at a fly-over turn, which passes outside its corner. Nor is there
+    one next to a leg that is shorter than its two turns, which is possible if turns are limited only by a maximum
+    angle. The corners of such a leg are evaluated as drawn, and the simulated flight shows how the aircraft flies them.
     """
     if data.fly_over:
         return np.zeros(path.shape[0])

@@ -1,9 +1,10 @@
 """Encode the waypoints of a path as a vector in a box, and decode them.
 
 `rotated` is the encoding proposed by Yang, Tang and Lozano (CEC 2014, section III, eq. 12): an axis along the direction
-of the path, with one interval of it for each waypoint, which deviates across. `cartesian` and `polar` are the encodings
-that they compare it with; `bearing` is a polar encoding that the paper does not have.
-Lengths, angles and slopes are invariant under the rotation, so only encodings and the grids that seed a search work in
+of the path is divided into one interval per waypoint, and each waypoint deviates across the axis. `cartesian` and
+`polar` are the encodings that they compare it with; `bearing` is a polar encoding that the paper does not have.
+
+Lengths, angles and slopes do not change under the rotation, so only encodings and the grids that seed a search work in
 rotated axes.
 """
 
@@ -34,7 +35,7 @@ class WaypointFrames(NamedTuple):
 
     east, north: (n,) position where along and across are 0, m.
     cosine, sine: (n,) cosine and sine of the angle from east to along, counter-clockwise.
-    edges: (n + 1,) waypoint i has its `along` between edges[i] and edges[i + 1], m.
+    edges: (n + 1,) limits of the waypoints' intervals, m: waypoint i lies between edges[i] and edges[i + 1] along.
     """
 
     east: Floats
@@ -200,7 +201,7 @@ class Encoding:
     frames: WaypointFrames | None = None
 
     def __post_init__(self) -> None:
-        """Lock the box."""
+        """Make the limits of the box read-only."""
         for name in ("lower", "upper"):
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
@@ -315,7 +316,7 @@ def cartesian_encoding(space: Space, waypoints: int) -> Encoding:
 
 
 def polar_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding of each inner waypoint as a step (r, theta, up) from the previous one (section III.A).
+    """Make an encoding of each inner waypoint as a step (r, theta, up) from the last one (section III.A).
 
     theta is "the turning angle at each waypoint", within +-180 degrees, positive to the left. It is relative to the
     previous leg, and at the first waypoint to the direction from start to destination. r is 5 % to 200 % of the

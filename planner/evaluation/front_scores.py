@@ -1,4 +1,4 @@
-"""Compute the values by which the plans of a front are compared.
+"""Compute the values by which the plans of a Pareto front are compared.
 
 Exposure is the paper's detection density (eq. 10 of Yang, Tang and Lozano, CEC 2014), integrated over the time of
 flight in the mean wind, in seconds at full density. The minimum height above ground is taken at samples of each leg.
@@ -26,7 +26,10 @@ _ENERGY_COLUMN = 4
 
 
 class Value(IntEnum):
-    """Columns of the values by which paths are compared: m, s, m, s and J."""
+    """Columns of the values by which paths are compared.
+
+    Length (m), exposure (s), clearance (m), time (s) and energy (J).
+    """
 
     LENGTH = 0
     EXPOSURE = 1
@@ -38,7 +41,8 @@ class Value(IntEnum):
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
     """Return the values of each path in the order of `Value`, (n, 5), in m, s, m, s and J.
 
-    energy: cost of energy with any weight, as `make_travel_cost` returns it; if None, the energy is NaN.
+    energy: cost function for energy, as `make_travel_cost` returns it, of which only the power coefficients and the
+        winds are used; if None, the energy is NaN.
     paths: (n, w, 3) m.
     """
     out = np.zeros((len(paths), len(Value)))
@@ -79,7 +83,7 @@ def _fill_values(
 
 @inner
 def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float) -> float:
-    """Return the mean detection density along a leg, summed over the radars that it passes within reach.
+    """Return the mean detection density along a leg, summed over the radars whose range it enters.
 
     start: (3,) start of the leg, m.
     dx, dy, dz: vector of the leg, m.
@@ -107,9 +111,9 @@ def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz
 
 @inner
 def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
-    """Return the minimum height above ground at samples of a leg, or of earlier legs if it is lower, m.
+    """Return the minimum height above ground at samples of a leg and on the earlier legs, m.
 
-    start: start of the leg, m.
+    start: (3,) start of the leg, m.
     dx, dy, dz: vector of the leg, m.
     min_height: minimum height on the earlier legs, m.
 

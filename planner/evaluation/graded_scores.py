@@ -1,8 +1,9 @@
-"""Score the amount by which a path violates each constraint along its whole length, and its kill exposure.
+"""Score how much a path violates each constraint along its whole length, and its kill exposure.
 
-Where the paper counts violations at six points per leg, these scores measure them along every leg, so that a search can
-descend them. Corners are evaluated as flown, with arcs and parabolas or with the autopilot's tracking error, wherever
-that could change the result. One call evaluates many paths; `score_path` evaluates one from other kernels.
+The paper counts violations at six points per leg. These scores measure violations along every leg instead, so that a
+search can reduce them step by step. A corner is evaluated as flown, with its arc and parabolas or with the autopilot's
+tracking error, wherever that could change the result. `graded_scores` evaluates many paths in one call; `score_path`
+evaluates one path from other kernels.
 """
 
 import math
@@ -28,11 +29,11 @@ from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays, Re
 from planner.evaluation.terrain_clearance import (
     HEIGHT_LAG,
     TERRAIN_LEG,
+    clearance_deficit,
     compute_height_lags,
     lag_at,
     sample_terrain,
     segment_pixels,
-    terrain_excess,
 )
 from planner.evaluation.threat_index import MissileIndex, kill_density
 from world.arrays import Floats, Heights, Ints
@@ -109,7 +110,7 @@ def score_path(
     limits: limits that are precomputed from the problem.
     scratch: working memory for a path of w waypoints.
     path: (w, 3) m.
-    violations: `VIOLATIONS` record of zeros, to which the violations are added.
+    violations: `VIOLATIONS` record, all 0 before the call.
     objectives: `OBJECTIVES` record to fill.
     """
     score_legs(data, limits, scratch, path, violations, objectives)
@@ -161,11 +162,11 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Add the violations of the clearance above ground along the legs: the second part of `score_path`.
+    """Add the missing clearance above ground along the legs: the second part of `score_path`.
 
     scratch: legs and lags of the path from `score_legs`; its records of terrain samples are overwritten.
     path: (w, 3) m.
-    violations: `VIOLATIONS` record, to whose terrain violation the deficits are added.
+    violations: `VIOLATIONS` record, to whose terrain violation the missing clearance is added.
     """
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
@@ -193,12 +194,12 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Set the exposure to missiles, and add clearance violations at corners: part 3 of `score_path`.
+    """Set the kill exposure, and add missing clearance at corners: the third part of `score_path`.
 
     scratch: legs, corners, ground samples and lags of the path from `score_legs` and `score_ground`; its missile gaps
         are overwritten.
     path: (w, 3) m.
-    violations: `VIOLATIONS` record; the violations of flown corners are added to its terrain violation.
+    violations: `VIOLATIONS` record, to whose terrain violation the missing clearance of flown corners is added.
     objectives: `OBJECTIVES` record, whose kill exposure is set.
 
     A corner is examined as flown only if it is near ground or missiles, or deviates by more than `CORNER_TOLERANCE_M`
@@ -240,7 +241,9 @@ def score_missiles(
             vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown_corners[i].radius)
             below, above, extra_height, missile_margin = 0.0, 0.0, 0.0, margin
         if is_near_ground:
-            violations.terrain += _clearance_deficit(heights, slope_bounds, to_pixel, required, extra_height, vertices)
+            violations.terrain += _corner_clearance_deficit(
+                heights, slope_bounds, to_pixel, required, extra_height, vertices
+            )
         if is_near_missile:
             kill_sum += _corner_exposure(missiles, missile_margin, vertices, below, above)
     objectives.kill_exposure = kill_sum * POINTS_PER_LEG * (count - 1) / length
@@ -291,14 +294,13 @@ def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, object
 
 @inlined
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
-    """Return the radius of the arc at waypoint i, m.
-
-    The radius is 0 for a turn that cannot be flown. It is also 0 next to a leg that is too short for its two turns;
-    such legs are allowed if only the angle of turns is limited. `planner.evaluation.corners.fly_by_radii` gives the
-    radii of a whole path.
+    """Return the radius of the fly-by arc at waypoint i, m; 0 if the turn cannot be flown.
 
     legs_hold_turns: True if legs must be as long as their turns, so that none is too short.
     legs, corners: filled `LEG` records (w - 1,) and `CORNER` records (w,) of the path.
+
+    If only the angle of turns is limited, the radius is also 0 next to a leg that is too short for its two turns.
+    `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):
@@ -359,18 +361,17 @@ def _measure_arcs(
 
 @inlined
 def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:
-    """Return the largest deviations of the flight below and above the legs near a corner, m.
-
-    They are taken from the beginning of the leg after the corner.
+    """Return the largest deviations below and above the leg after a corner, near the corner, m.
 
     lag, leg: `HEIGHT_LAG` and `LEG` records of the leg after the corner.
+    corner: `CORNER` record, with the length that the turn takes of this leg.
     """
     start_lag, settled_lag = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, start_lag, settled_lag), max(0.0, -start_lag, -settled_lag)
 
 
 @inner
-def _clearance_deficit(
+def _corner_clearance_deficit(
     heights: Heights,
     slope_bounds: SlopeBounds,
     to_pixel: PolyMapRecord,
@@ -380,24 +381,24 @@ def _clearance_deficit(
 ) -> float:
     """Return the missing clearance along a flown turn, integrated along its chords, m·km.
 
-    vertices: (k, 3) points of the turn, m.
     heights, slope_bounds: ground heights by pixel, m, and steepest slopes of the ground.
     to_pixel: map from east and north to column and row.
     required: required clearance.
     extra_height: height that is required in addition to the clearance, m.
+    vertices: (k, 3) points of the turn, m.
     """
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
         x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
         ends = segment_pixels(to_pixel, x, y, x2, y2)
-        total += terrain_excess(heights, slope_bounds, required, extra_height, ends, x, y, z, x2, y2, z2, math.inf)
+        total += clearance_deficit(heights, slope_bounds, required, extra_height, ends, x, y, z, x2, y2, z2, math.inf)
     return total
 
 
 @inner
 def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
-    """Return the kill density along a flown corner times the corner's length, m.
+    """Return the kill density along a flown corner, integrated over its length, m.
 
     margin: distance that is added to the radii of the spheres, m.
     vertices: (k, 3) points of the corner, m.

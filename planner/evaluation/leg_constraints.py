@@ -24,13 +24,13 @@ from world.kernels import Record, Records, compiled, inlined, inner
 PATHS_PER_BLOCK = 128
 
 
-def _block_fields(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
+def _block_fields(value_type: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
     """Return the definitions of record fields that hold one value for each path of a block.
 
-    kind: type of the values.
+    value_type: type of the values.
     names: names of the fields.
     """
-    return [(name, kind, (PATHS_PER_BLOCK,)) for name in names]
+    return [(name, value_type, (PATHS_PER_BLOCK,)) for name in names]
 
 
 # One point of each path: position (m) and pixel.
@@ -73,7 +73,7 @@ def clear_sums(sums: Record) -> None:
 
 @inlined
 def copy_point(source: Record, target: Record, size: int) -> None:
-    """Copy a point of each path of a block into another record.
+    """Copy one point of each path of a block into another record.
 
     source, target: records with one entry per path for east, north and up, m, and for raster column and row.
     size: number of paths in the block.
@@ -123,6 +123,7 @@ def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: i
     paths: (n, w, 3) m.
     first_path: number of the first path of the block.
     size: number of paths in the block.
+    block: scratch of the block of paths.
     """
     end = block.end
     x = block.x
@@ -201,10 +202,10 @@ class PrecomputedLimits(NamedTuple):
 
 @inner
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
-    """Return the limits that are the same for all paths of a problem, computed once for all of them.
+    """Return the limits that are the same for all paths of a problem.
 
-    Where the aircraft limits slopes, the smallest limit on any course and at any altitude is taken: a leg within it
-    needs no further check.
+    If the aircraft limits slopes, the smallest limit on any course and at any altitude is taken: a leg within it needs
+    no further check.
     """
     climb, dive = data.max_climb, data.max_dive
     slopes_by_aircraft = math.isnan(climb) or math.isnan(dive)
@@ -232,7 +233,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
 
 @inlined
 def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
-    """Return the steepest slope that the aircraft can fly on every course between floor and ceiling, rad.
+    """Return the steepest slope that the aircraft can fly on every course at all altitudes, rad.
 
     air_angles: (h,) steepest climb (or descent) relative to the air at the table's heights, rad.
 
@@ -259,8 +260,9 @@ def _course_slope_limits(
     start_altitude, end_altitude: m AMSL.
     wind: downwind unit vector.
 
-    A limit that the scenario states applies. Otherwise it is the lowest limit of the aircraft at three altitudes: the
-    two given ones and the one half-way between them. The angle margin is subtracted.
+    If the scenario states a limit, that limit applies. Otherwise it is the lowest limit of the aircraft at three
+    altitudes: the two given altitudes and the altitude half-way between them. The angle margin is subtracted in both
+    cases.
     """
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
@@ -332,13 +334,12 @@ def slope_excess(
 
 @inlined
 def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the excess of the turn between the unit courses u and v over its limit, rad.
-
-    The excess follows eqs. 1 and 2 of Yang, Tang and Lozano 2014. It is 0 for a turn within the limit, and for a leg
-    without a course.
+    """Return the angle by which the turn between unit courses u and v exceeds its limit, rad; else 0.
 
     max_turn, cos_max_turn: the limit, rad, and its cosine.
-    ux, uy, vx, vy: east and north of the courses; (0, 0) for a leg without length.
+    ux, uy, vx, vy: east and north of the courses; (0, 0) for a leg without length, whose excess is 0.
+
+    This is eqs. 1 and 2 of Yang, Tang and Lozano 2014.
     """
     dot = ux * vx + uy * vy
     if dot >= cos_max_turn or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
@@ -383,10 +384,10 @@ def add_leg_violations(
             excess = slope_excess(
                 data, limits, legs[i].east, legs[i].north, horizontal_length, path[i, 2], path[i + 1, 2]
             )
-        violations.slope += _violation(excess, by_amount)
+        violations.slope += _score_excess(excess, by_amount)
     if limits.slopes_by_aircraft and data.legs_hold_turns and not data.fly_over:
         for i in range(1, legs.shape[0]):
-            violations.slope += _violation(_arc_slope_excess(data, limits, path, i, legs, corners), by_amount)
+            violations.slope += _score_excess(_arc_slope_excess(data, limits, path, i, legs, corners), by_amount)
 
 
 @inlined
@@ -405,11 +406,11 @@ def _add_turn_violations(
         uy = legs[i - 1].north
         vx = legs[i].east
         vy = legs[i].north
-        violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
+        violations.turn += _score_excess(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
         if not math.isnan(end_course):
             ux, uy, vx, vy = courses_at_waypoint(data, legs, i)
-            violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
+            violations.turn += _score_excess(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
 
 
 @inlined
@@ -436,7 +437,7 @@ def _add_bounds_violations(
         excursion = corners[i].excursion
         excess = max(0.0, west - x + excursion, x - east + excursion, south - y + excursion, y - north + excursion)
         excess = max(excess, floor - z, z - ceiling)
-        violations.bounds += _violation(excess, by_amount)
+        violations.bounds += _score_excess(excess, by_amount)
 
 
 @inlined
@@ -468,14 +469,14 @@ def _add_leg_length_violations(
         if missing_length > -MAX_ROLL_LENGTH_M and not data.fly_over:
             altitude = min(path[i, 2], path[i + 1, 2])
             missing_length += roll_length(data.aircraft, legs, corners, i, altitude, limits.wind)
-        violations.turn += _violation(min(10.0, max(0.0, missing_length / 100.0)), by_amount)
+        violations.turn += _score_excess(min(10.0, max(0.0, missing_length / 100.0)), by_amount)
 
 
 @inlined
 def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
-    """Return by how much the arc at waypoint i is too steep for the aircraft, m per m; 0 if it is not.
+    """Return how much the arc at waypoint i is too steep for the aircraft, m per m; 0 if it is not.
 
     path: (w, 3) m.
     i: index of an inner waypoint.
@@ -496,10 +497,10 @@ def _arc_slope_excess(
 
 
 @inlined
-def _violation(excess: float, by_amount: bool) -> float:
+def _score_excess(excess: float, by_amount: bool) -> float:
     """Return what an excess over a limit adds to a score.
 
-    by_amount: True for the excess itself, False for 1 if there is any excess.
+    by_amount: True to add the excess itself, False to add 1 for any excess above 0.
     """
     if by_amount:
         return excess

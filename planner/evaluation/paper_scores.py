@@ -106,7 +106,7 @@ def _score_paths(
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
-    """Score `size` paths side by side, from path number `first_path` on; store the sums in the block.
+    """Score `size` paths side by side, from number `first_path` on; store their sums in the block.
 
     Each waypoint is mapped to the raster once. Between waypoints a leg is assumed to be straight in pixels.
     """
@@ -213,10 +213,10 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
     """Find the threats that may reach the current point of each path.
 
-    threat_cells: for each cell of a grid, the part of one long list that holds the threats near this cell.
+    threat_cells: for each cell of a grid, the range of entries in one long list that holds the threats near this cell.
     size: number of paths in the block.
-    block: one point of each path. `first` and `count` are set to the first entry and the length of this part. `count`
-        is 0 for a point below or above the altitudes that the threats reach.
+    block: one point of each path. `first` and `count` are set to the first entry and the length of the range of the
+        point's cell; `count` is 0 at an altitude that no threat of the cell reaches.
     """
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
@@ -241,9 +241,7 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
 
 @inlined
 def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) -> None:
-    """Add to each path's sums how much its current point is exposed to kill and detection by nearby threats.
-
-    These are eqs. 9 and 10 of Yang, Tang and Lozano 2014.
+    """Add the kill and detection exposure of each path's current point to the sums of the path.
 
     spheres: centres, radii and scales of all threats.
     units: one array of threat indices for all map cells: the threats near the first cell, then those near the second.
@@ -251,8 +249,8 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
     block: one point of each path. `first` and `count` say which entries of `units` belong to the point's cell. `sums`
         is updated.
 
-    The loop goes through the threats in rounds: round 0 adds the first threat near each point, round 1 the second. This
-    avoids branches that the processor cannot predict.
+    These are eqs. 9 and 10 of Yang, Tang and Lozano 2014. The loop goes through the threats in rounds: round 0 adds the
+    first threat near each point, round 1 the second. This avoids branches that the processor cannot predict.
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection

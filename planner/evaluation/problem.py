@@ -141,7 +141,7 @@ def threat_records(threats: Threats) -> Records:
 
 
 def sphere_records(threats: Records) -> Records:
-    """Return `THREAT` records as `SPHERE` records (m,), with the squares and powers that points need."""
+    """Convert `THREAT` records to `SPHERE` records (m,), with squared radii and fourth powers of the scales."""
     spheres = np.zeros(len(threats), dtype=SPHERE)
     for name in ("east", "north", "up"):
         spheres[name] = threats[name]
@@ -201,10 +201,10 @@ def required_clearance(data: ProblemArrays) -> RequiredClearance:
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
-    """Express the maximum height above ground as a required clearance above ground turned upside down.
+    """Express the maximum height above ground as a required clearance above the ground turned upside down.
 
-    If the heights of the path and of the ground are given the opposite sign, then a path below the maximum height is a
-    path above this clearance. The same code can check both.
+    If the heights of the path and of the ground are negated, a path below the maximum height becomes a path above this
+    clearance, so that the same code checks both.
     """
     space = data.airspace
     return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
@@ -294,7 +294,7 @@ HEIGHT_MARGIN_M = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Task of a search: a scenario, the limits of the UAV, and both as arrays for compiled code.
+    """A scenario, the limits of the UAV, and the arrays that compiled code searches and certifies with.
 
     search: arrays with the margins that a search aims for.
     certified: arrays with the margins that the certificate requires.
@@ -457,7 +457,7 @@ def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fr
     """Return the required margins to zones, changed by the scenario's `zone_margin_m` if it is stated.
 
     horizontal, vertical: margins without `zone_margin_m`, m.
-    end_fraction: fraction of a fixed end's distance that replaces a margin which the end violates.
+    end_fraction: as in `ZoneMargins`.
 
     `zone_margin_m` changes the horizontal margin by its difference from `CERTIFIED_ZONE_MARGIN_M`. An increase also
     applies to the vertical margin, a reduction does not.
@@ -468,12 +468,12 @@ def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fr
 
 
 def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
-    """Return the largest margin of a search to the required clearance or to the maximum height, m.
-
-    Between these two limits lies the band in which a path has to stay. A search may exceed the certificate's margin by
-    a fraction of this band. The margin is inf without a maximum height.
+    """Return the largest buffer of a search above the required clearance, or below the maximum height, m.
 
     certified_margin: margin of the certificate to the same limit, m.
+
+    A path has to stay in the band between these two limits. A search may exceed the certificate's margin by a fraction
+    of the height of this band. The buffer is inf without a maximum height.
     """
     space = certified.airspace
     band_height = space.max_height - certified.clearance - certified.buffer - space.buffer
@@ -488,11 +488,9 @@ def _none_to_nan(value: float | None) -> float:
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
     """Return the buffer (height required above the clearance) at a fixed end, m.
 
-    It is the full buffer, or a fraction of the available height if the end is too low for the full buffer.
-
     point: position of the end, (3,) m.
     buffer: full buffer, m.
-    fraction: 0 to 1.
+    fraction: fraction of the available height that becomes the buffer if the end is too low for the full buffer.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     # 1 cm less, against rounding.
@@ -513,7 +511,7 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
-    """Return the arrays with a smaller area and a smaller range of altitudes, which include both fixed ends.
+    """Reduce the area and the range of altitudes of the arrays by margins, but keep both fixed ends inside.
 
     lateral: margin to the edges of the map, m.
     height: margin to floor and ceiling, m.

@@ -43,12 +43,14 @@ def _remaining_fraction(lengths: float) -> float:
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:
-    """Return the distance over the ground that the aircraft covers during its altitude lag, m.
+    """Return the distance over the ground that the aircraft covers during the autopilot's altitude lag, m.
 
     tracking: tracking error of the autopilot, with the lag, s.
     east, north: unit course.
     amsl: altitude, m.
     wind: downwind unit vector.
+
+    On a course that cannot be held in the wind, the airspeed takes the place of the ground speed.
     """
     (wx, wy), wind_speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
     speed_over_ground = ground_speed(
@@ -65,14 +67,14 @@ def set_lag(
 ) -> float:
     """Fill the `HEIGHT_LAG` record of a leg; return the distance of the aircraft below the leg's end, m.
 
-    On a leg with a slope the lag approaches a constant distance. On a leg with a change of altitude below the
-    autopilot's step, the aircraft is demanded the final altitude from the beginning.
-
     tracking: tracking error of the autopilot, with the step, m.
     length: lag length (`lag_length`), m.
     horizontal_length, altitude_change: horizontal length and altitude change of the leg, m.
     below: distance of the aircraft below the start of the leg, m.
     lag: the record to fill.
+
+    On a leg with a slope the lag approaches a constant distance. If the altitude changes by less than the autopilot's
+    step, the autopilot demands the final altitude from the beginning of the leg.
     """
     lag.steady, lag.slant = length * altitude_change / max(horizontal_length, 1e-6), 0.0
     if abs(altitude_change) < tracking.step:
@@ -188,7 +190,7 @@ def _take_sample(
 
 
 @inlined
-def terrain_excess(
+def clearance_deficit(
     heights: Heights,
     slope_bounds: SlopeBounds,
     required: RequiredClearance,
@@ -202,7 +204,9 @@ def terrain_excess(
     bz: float,
     max_excess: float,
 ) -> float:
-    """Return how far the line a-b is below the required clearance: depth times length, m·km.
+    """Return the clearance deficit of the line a-b, integrated along the line, m·km.
+
+    The deficit is the depth below the required clearance.
 
     heights: ground heights by pixel, m.
     slope_bounds: steepest slopes of the ground near each pixel, which set the steps between samples.
@@ -210,7 +214,7 @@ def terrain_excess(
     extra_height: additional height that is required on this line, m.
     ends: columns and rows of a and b.
     ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
-    max_excess: value beyond which the sum over samples ends, so that the result is a lower bound, m·km.
+    max_excess: deficit above which the integration stops; the result is then a lower bound, m·km.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row

@@ -1,8 +1,8 @@
-"""Spatial indexes of threats: units by grid cell for points, missiles by position for line segments.
+"""Spatial indexes of threats: by grid cell for points, and by position of the missiles for line segments.
 
-`ThreatCells` lists for each cell of a grid the units whose spheres reach it; the paper's scores look up points in it.
-`MissileIndex` stores missiles in the order of grid cells, one grid per class of similar radii; `kill_density`
-integrates the kill density along a segment and measures the distance of the nearest spheres.
+`ThreatCells` lists for each cell of a grid the units (numbers of threats) whose spheres reach it; the paper's scores
+look up points in it. `MissileIndex` stores missiles in the order of grid cells, one grid per class of similar radii;
+`kill_density` integrates the kill density along a segment and measures the distance of the nearest spheres.
 """
 
 import math
@@ -89,7 +89,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the record of each cell: its part of the list of units, and the altitudes of these units.
+    """Fill the record of each cell: its range of the list of units, and the altitudes they reach.
 
     first: (cells + 1,) cell k has the entries first[k] to first[k + 1] - 1 of the list.
     units: the list: first the units of cell 0, then those of cell 1.
@@ -253,13 +253,14 @@ def kill_density(
     below: float,
     above: float,
 ) -> tuple[float, float, float]:
-    """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
+    """Return the mean kill density over the segment a-b, and the distances of spheres from its ends, m.
 
     index: missiles in classes of similar radii, each with its own grid; only missiles in cells near a-b are tested.
     margin: distance that is added to the radii, m.
     max_distance: a returned distance is exact if it is below this, m; otherwise it may be inf.
     ax, ay, az, bx, by, bz: east, north and altitude of the two ends, m.
-    length_a, length_b: the distances at a and b are those of the first length_a and the last length_b m of the segment.
+    length_a, length_b: lengths of the parts at both ends, m, for which the distances to the nearest sphere are
+        returned.
     below, above: largest distance of the aircraft below and above the segment, from its tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
@@ -315,9 +316,9 @@ def kill_density(
 
 @inlined
 def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, float]:
-    """Sort two fractions of a line, and intersect the interval between them with [0, 1].
+    """Sort two fractions of a line, and clip the interval between them to [0, 1].
 
-    The first result exceeds the second if the interval lies off the line.
+    The first result exceeds the second if the interval does not overlap the line.
     """
     start_fraction, end_fraction = (
         (start_fraction, end_fraction) if start_fraction < end_fraction else (end_fraction, start_fraction)
@@ -327,13 +328,14 @@ def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, 
 
 @inlined
 def _shift_towards_missile(start_height: float, altitude_change: float, below: float, above: float) -> float:
-    """Shift a segment towards a missile by up to the tracking error; return the new height of its start, m.
-
-    Heights are measured from the missile.
+    """Shift a segment towards a missile by up to the tracking error; return its start's new height, m.
 
     start_height: height of the segment's start above the missile, m.
     altitude_change: altitude change of the segment up to its closest point, m.
     below, above: vertical tracking error, m.
+
+    The returned height, too, is measured from the missile. The shift ends when the closest point is level with the
+    missile.
     """
     closest_height = start_height + altitude_change
     shift = min(closest_height, below) if closest_height > 0.0 else max(closest_height, -above)

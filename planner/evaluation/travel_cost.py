@@ -7,10 +7,10 @@ no such time if the wind is faster than the aircraft and does not blow along the
 height, so a leg is integrated by Simpson's rule over its two ends and its middle.
 
 In a uniform wind a straight line takes the least time, and T is a norm of d plus a term that is the same for all paths
-to a destination. Then only the direction of a detour matters, by at most V / sqrt(V^2 - w^2).
+to a destination. Only the direction of a detour then matters, by a factor of at most V / sqrt(V^2 - w^2).
 
-In a forecast the wind also changes with place and time, so that a detour can pay. The wind at a place is that of the
-time at which a straight flight to the destination has flown as far as the place is from the start.
+In a forecast the wind also changes with place and time, so a detour may save time. The wind at a place is taken at the
+time at which a straight flight to the destination has covered the distance between the start and that place.
 """
 
 import math
@@ -58,13 +58,13 @@ class WindGrid(NamedTuple):
 
 @by_reference
 class TravelCost(NamedTuple):
-    """Weights of length, time and energy in a path's cost, the power at each height, and the wind of a forecast.
+    """Weights of length, time and energy in a path's cost, with the aircraft's power and the wind.
 
     length: cost per metre of path.
     time: cost per second.
     energy: cost per joule.
     level, linear, square: (h,) coefficients of the power (W) at the heights of the performance table and at its
-        airspeed: level + linear x + square x^2, where x is the sine of the climb angle to the air.
+        airspeed: level + linear x + square x^2, where x is the sine of the climb angle relative to the air.
     min_sine, max_sine: (h,) bounds of x, beyond which power is constant: idle and full throttle.
     winds: wind of a forecast.
     """
@@ -92,11 +92,12 @@ LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE
 
 
 def make_wind_grid(scenario: Scenario, table: PerformanceTable) -> WindGrid:
-    """Return the wind of a scenario's forecast over its map; `NO_WINDS` without a forecast.
-
-    Each place has the wind of the time at which a straight flight from the start would have come as far as the place.
+    """Sample the wind of a scenario's forecast on a grid over its map; `NO_WINDS` without a forecast.
 
     table: performance of the aircraft in the mean wind.
+
+    The wind at each place is taken at the time at which a straight flight from the start has covered the distance to
+    that place.
     """
     if scenario.wind.field is None:
         return NO_WINDS
@@ -149,14 +150,14 @@ def make_time_cost(table: PerformanceTable, winds: WindGrid = NO_WINDS) -> Trave
 
 
 def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGrid = NO_WINDS) -> TravelCost | None:
-    """Make the cost function of a path's energy, in m of level flight in still air; None if power is unknown.
-
-    The power is that of `Envelope.power`: a parabola through idle at the steepest descent, level flight, and full
-    throttle. At a height at which level flight is impossible, the power at the nearest height with level flight
-    applies.
+    """Make the cost function of a path's energy, in m of level flight; None if the power is unknown.
 
     table: performance of the aircraft at the airspeed of the path.
     winds: wind of a forecast; without it, only the mean wind is used.
+
+    The power follows `Envelope.power`: a parabola through idle at the steepest descent, level flight, and full
+    throttle. At a height at which level flight is impossible, the power at the nearest height with level flight
+    applies.
     """
     # Level, linear, square, min_sine and max_sine at each altitude, as in `TravelCost`; NaN if the power is unknown or
     # level flight is impossible.
@@ -184,7 +185,7 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
 
 
 class LegTime(NamedTuple):
-    """Time of a leg, as `leg_time` computes it, with its derivatives.
+    """Time of a leg with its derivatives, as `leg_time` computes them.
 
     seconds: time, s.
     by_east, by_north, by_up: change of the time with each component of the leg's vector, s/m.
@@ -315,12 +316,12 @@ def _time_energy_cost(
     y: float,
     amsl: float,
 ) -> tuple[float, bool]:
-    """Return the cost of a leg's time and energy in the wind of one place, and True if the leg can be flown.
+    """Return the cost of a leg's time and energy, and True if the leg can be flown.
 
     travel: weights of time and energy in the cost.
     table: performance of the aircraft.
     leg: vector of the leg, m.
-    x, y, amsl: place at which the wind is taken, m.
+    x, y, amsl: east, north and altitude of the place whose wind is applied to the whole leg, m.
     """
     dx, dy, dz = leg
     conditions = _conditions_at(travel, table, x, y, amsl)
@@ -461,17 +462,17 @@ def _add_place_model(
     timed_cost: float,
     model: LegModel,
 ) -> None:
-    """Add the derivatives of a leg's cost with respect to the place at which its wind and power are taken.
+    """Add the derivatives of a leg's cost that result from moving the place of its wind and power.
 
-    start: start of the leg, m.
+    start: (3,) start of the leg, m.
     step: vector of the leg, m.
     fraction: fraction of the leg at which the place lies.
     weight: weight of the place in the cost of the leg.
     timed_cost: cost of time and energy of the leg in the wind of the place.
-    model: derivatives of the leg's cost with respect to both ends, to which those of the place are added.
+    model: derivatives of the leg's cost with respect to both ends; updated.
 
-    The place moves with the ends: at fraction f by 1 - f times the step of the start, and by f times that of the end.
-    The derivatives are central differences over `HORIZONTAL_STEP_M` and `HEIGHT_STEP_M`.
+    A place at fraction f moves by 1 - f times the movement of the start, and by f times the movement of the end. The
+    derivatives with respect to the place are central differences over `HORIZONTAL_STEP_M` and `HEIGHT_STEP_M`.
     """
     x, y, amsl = start[0] + fraction * step[0], start[1] + fraction * step[1], start[2] + fraction * step[2]
     # A forecast changes wind on each axis, the mean profile only with altitude.
@@ -533,7 +534,7 @@ def _add_step_model(
     gradient: tuple[float, float, float],
     slope_factor: float,
 ) -> None:
-    """Add derivatives that are given with respect to a leg's vector to those with respect to its ends.
+    """Add derivatives with respect to a leg's vector to the derivatives with respect to its ends.
 
     curvature: (2, 3, 2, 3) second derivatives of the leg's cost by its ends; updated.
     slopes: (2, 3) derivatives of the leg's cost by its ends; updated.

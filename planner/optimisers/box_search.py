@@ -1,4 +1,4 @@
-"""Ask-and-tell interface of all optimisers: a population-based search in a box."""
+"""Define the ask-and-tell interface of all optimisers: a population-based search in a box."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -11,12 +11,12 @@ from world.arrays import Floats, Ints
 class BoxSearch(ABC):
     """Population-based search in a box: `ask` returns samples to score, `tell` takes their scores.
 
+    The first `ask` returns the whole population, later calls return half of it.
+
     lower, upper: (d,) lowest and highest value of each variable.
     rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
     population: even number of samples.
     initial: (population, d) first samples; None for uniform ones.
-
-    The first `ask` returns the whole population, later calls half of it.
     """
 
     def __init__(

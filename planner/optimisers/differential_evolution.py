@@ -17,6 +17,10 @@ CROSSOVER_RATE = 0.9
 class DifferentialEvolution(BoxSearch):
     """Differential evolution: a trial vector replaces its target vector if it ranks no worse.
 
+    The arguments are the same as for `BoxSearch`. Trial vectors are made for half of the population at a time, so that
+    a generation costs as much as with the estimation of distribution algorithms. samples and scores are the population,
+    (n, d) and (n, c); empty before the first `tell`.
+
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
     >>> search = DifferentialEvolution(np.full(3, -2.0), np.full(3, 6.0), rank, 20, np.random.default_rng(1))
@@ -25,19 +29,15 @@ class DifferentialEvolution(BoxSearch):
     ...     search.tell((samples**2).sum(axis=1)[:, None])
     >>> bool(search.scores.min() < 1e-3)
     True
-
-    The arguments are the same as for `BoxSearch`. Half of the population is challenged at a time, so that a generation
-    costs as much as with the estimation of distribution algorithms. samples and scores are the population, (n, d) and
-    (n, c); empty before the first `tell`.
     """
 
     _generation = 0
 
     def tell(self, scores: Floats) -> None:
-        """Let the trial vectors replace the samples that rank no better, and make new trial vectors.
+        """Replace target vectors that do not rank better than their trial vectors, and make new trial vectors.
 
-        scores: (n, c) scores of the last trial vectors. The first scores are those of the whole first population, which
-            replaces nothing.
+        scores: (n, c) scores of the last trial vectors. The first scores belong to the first population, which replaces
+            nothing.
         """
         if not len(self.scores):
             self.samples, self.scores = self._pending_samples.copy(), np.array(scores)
@@ -66,7 +66,7 @@ class DifferentialEvolution(BoxSearch):
     def _target_rows(self) -> Ints:
         """Return the rows of the samples that the next trial vectors may replace.
 
-        These are the first and the last half of the population in turn.
+        The first half and the second half of the population take turns.
         """
         count = len(self.samples)
         return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)

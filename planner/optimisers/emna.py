@@ -1,7 +1,7 @@
 """EMNA: estimation of multivariate normal algorithm, with a full covariance of all variables.
 
-Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002, chapter 3 (EMNA-global). Where
-`planner.optimisers.umda` fits an independent Gaussian to each variable, this fits one multivariate Gaussian.
+Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002, chapter 3 (EMNA-global).
+`planner.optimisers.umda` fits an independent Gaussian to each variable; this algorithm fits one multivariate Gaussian.
 """
 
 import numpy as np
@@ -16,7 +16,9 @@ COVARIANCE_RIDGE = 1e-9
 
 
 class Emna(Umda):
-    """Estimation of distribution like `planner.optimisers.umda.Umda`, with a full covariance.
+    """UMDA with one multivariate Gaussian instead of independent Gaussians.
+
+    The arguments are the same as for `planner.optimisers.umda.Umda`; `basis` and `floor` are unused.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -26,8 +28,6 @@ class Emna(Umda):
     ...     search.tell((samples**2).sum(axis=1)[:, None])
     >>> bool(search.scores.min() < 1e-6)
     True
-
-    The arguments are the same as for `Umda`; `basis` and `floor` are unused.
     """
 
     def _sample(self, count: int) -> Floats:

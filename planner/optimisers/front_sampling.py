@@ -53,15 +53,13 @@ MIN_EXPONENT = -3
 MAX_EXPONENT = 2
 
 
-class Kind(IntEnum):
-    """Kind of displacement of a sample from its mean, the solution of the archive that it is drawn around.
+class Displacement(IntEnum):
+    """Kinds of displacement of a new sample from its mean, a solution of the archive.
 
     Each kind is equally frequent.
 
-    NEAR: along the differences to the nearest solutions, with noise.
-    NOISE: only noise.
-    BLOCK: a block of neighbouring points moves towards its place in another solution.
-    NOISY_BLOCK: such a block, with noise.
+    NEAR: along the differences to the solutions nearest to the mean, with noise. NOISE: only noise. BLOCK: a block of
+    neighbouring points moves towards its place in another solution. NOISY_BLOCK: such a block, with noise.
     """
 
     NEAR = 0
@@ -71,13 +69,14 @@ class Kind(IntEnum):
 
 
 class FrontSampling:
-    """Ask-and-tell search for a front in a box.
+    """Ask-and-tell search for a Pareto front in a box.
 
     lower, upper: (d,) box.
     directions: (k, d) directions of the noise; the length of each is a step of scale 1.
     reference: (m,) upper limits of the objectives; a solution that reaches one of them is ignored.
     axes: number of variables per point; the variables of neighbouring points are adjacent.
-    size: largest number of solutions in the archive, which holds the front. population: samples per generation.
+    size: largest number of solutions in the archive, which holds the front.
+    population: number of samples per generation.
 
     >>> unit = np.eye(2)
     >>> search = FrontSampling(np.zeros(2), np.ones(2), unit, np.full(2, 2.0), 1, 20, 40, np.random.default_rng(1))
@@ -113,20 +112,24 @@ class FrontSampling:
         self._lower, self._upper, self._directions = lower, upper, directions
         self.reference, self._axes = reference, axes
         self._size, self._population, self._rng = size, population, rng
-        self._scales = np.full(len(Kind), FIRST_SCALE)
+        self._scales = np.full(len(Displacement), FIRST_SCALE)
         self._kinds: Ints = np.empty(0, dtype=np.int64)
         self.vectors: Floats = np.empty((0, lower.size))
         self.objectives: Floats = np.empty((0, reference.size))
 
     def ask(self) -> Floats:
-        """Draw samples (population, d): random solutions of the archive, displaced at random (`Kind`).
+        """Draw samples (population, d): random solutions of the archive, displaced at random (`Displacement`).
 
         The samples are clipped to the box.
         """
         mean_rows = self._rng.integers(len(self.vectors), size=self._population)
-        self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
+        self._kinds = kinds = self._rng.integers(len(Displacement), size=self._population)
         samples = self.vectors[mean_rows]
-        is_near, is_in_block, is_noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
+        is_near, is_in_block, is_noisy = (
+            kinds == Displacement.NEAR,
+            kinds >= Displacement.BLOCK,
+            kinds != Displacement.BLOCK,
+        )
         rng = self._rng
         # Displacements from a Gaussian fitted to the solutions nearest to each mean; distances are relative to the size
         # of the box.
@@ -169,13 +172,14 @@ class FrontSampling:
         return np.clip(samples, self._lower, self._upper)
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
-        """Insert the best samples into the archive, and adapt the scale of the noise of each kind.
+        """Insert the best samples into the archive, and adapt the scale of the noise.
 
         vectors: (n, d) samples.
         objectives: (n, m) their objectives, all minimised.
         violations: (n, c), all 0 for a sample that meets the constraints. Other samples never enter the archive.
 
-        A scale grows if enough of the samples with this noise enter the archive; otherwise it shrinks.
+        Each kind of displacement has its own scale, which grows if enough of the samples of this kind enter the
+        archive, and shrinks otherwise.
         """
         feasible_rows = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
         is_in_archive = np.zeros(len(vectors), dtype=bool)

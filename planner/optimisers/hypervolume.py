@@ -82,7 +82,7 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 
 @compiled
 def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
-    """Return marks (n, p): [i, j] is 1 if point i dominates probe j, otherwise 0.
+    """Mark the probes that each point dominates, (n, p): [i, j] is 1 if point i dominates probe j, else 0.
 
     points: (n, m) objectives of each point.
     probes: (m, p) objectives of each probe. A point at or below a probe in every objective dominates it.
@@ -103,8 +103,8 @@ def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
     first_rows: points that are chosen first.
 
     Each further point is the one that covers most probes not yet covered, the first of equal ones. This number of
-    probes, the gain of a point, can only decrease when other points are chosen. The number counted last is therefore an
-    upper bound, and only few points have to be counted again (Minoux, Optimization Techniques, Lecture Notes in Control
+    probes, the gain of a point, can only decrease when other points are chosen. A gain computed earlier is therefore an
+    upper bound, and only few gains have to be computed again (Minoux, Optimization Techniques, Lecture Notes in Control
     and Information Sciences 7, 1978).
     """
     size, width = marks.shape

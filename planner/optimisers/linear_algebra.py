@@ -28,7 +28,7 @@ def covariance(rows: Floats, first_column: int, second_column: int, size: int) -
 
 @compiled
 def cholesky(matrix: Floats, ridge: float) -> Floats:
-    """Return the lower Cholesky factor (d, d) of a covariance matrix (d, d) with a regularised diagonal.
+    """Return the lower Cholesky factor (d, d) of a covariance matrix (d, d) after enlarging its diagonal.
 
     ridge: value added to each variance, as a fraction of the mean variance.
     """
@@ -89,7 +89,8 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:
     """Fill `out` with the lower Cholesky factor of a positive definite band matrix.
 
     Both are stored as (d, b): column 0 is the main diagonal, column 1 the diagonal below it, and so on. Entry [i, k]
-    belongs to row i and column i - k of the matrix. A pivot is at least 1e-12 times the diagonal entry.
+    belongs to row i and column i - k of the matrix. Against rounding, a pivot is at least 1e-12 times the diagonal
+    entry.
     """
     size, width = matrix.shape
     for i in range(size):

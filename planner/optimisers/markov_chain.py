@@ -17,7 +17,10 @@ VARIANCE_RIDGE = 1e-6
 
 
 class MarkovChain(Umda):
-    """Estimation of distribution like `planner.optimisers.umda.Umda`, with a Markov chain over groups.
+    """UMDA with a Markov chain over groups of variables instead of independent Gaussians.
+
+    The arguments are the same as for `planner.optimisers.umda.Umda`; `basis` and `floor` are unused. The number of
+    variables is a multiple of `GROUP`; each group of consecutive variables depends on the previous group only.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -27,9 +30,6 @@ class MarkovChain(Umda):
     ...     search.tell((samples**2).sum(axis=1)[:, None])
     >>> bool(search.scores.min() < 1e-4)
     True
-
-    The arguments are the same as for `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of
-    `GROUP`; each group of consecutive variables depends on the previous group only.
     """
 
     GROUP = 3
@@ -61,8 +61,8 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
     size: number of variables of a group.
     ridge: value added to each variance, as a fraction of the mean variance of the group.
 
-    Returns two arrays (g, size, size), with a matrix for each of the g groups. The first has the regressions on the
-    previous group, zeros for group 0. The second has the Cholesky factors of the residuals' covariances.
+    Returns two arrays (g, size, size), with a matrix for each of the g groups: the coefficients of the regression
+    (zeros for the first group), and the Cholesky factor of the residuals' covariance.
     """
     group_count = rows.shape[1] // size
     regressions, residual_factors = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))
@@ -93,7 +93,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
 
 @compiled
 def draw_chain(normals: Floats, regressions: Floats, residual_factors: Floats) -> Floats:
-    """Turn independent standard normal numbers (n, d) into samples (n, d) of the chain, minus their mean.
+    """Convert independent standard normal numbers (n, d) to samples (n, d) of the chain, minus their mean.
 
     regressions, residual_factors: results of `fit_chain`.
     """

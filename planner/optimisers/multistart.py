@@ -46,8 +46,8 @@ MAX_DEVIATION_RATIO = 1e7
 class Gaussian:
     """Gaussian in the unit box, reflected at its sides, with the best point that it has found.
 
-    mean: (d,).
-    deviation: fraction of the box.
+    mean: (d,) centre of the first samples.
+    deviation: standard deviation of the first samples, as a fraction of the box.
     population: number of samples per generation.
     scale: (d,) relative standard deviations of the variables at the start; None for equal ones.
     """
@@ -94,7 +94,7 @@ class Gaussian:
         return self.deviation * math.sqrt(float(np.diag(self._matrix).mean()))
 
     def draw(self, rng: np.random.Generator) -> Floats:
-        """Draw a generation (population, d) in the unit box."""
+        """Draw a generation of points (population, d) in the unit box."""
         self._draws = rng.standard_normal((self.population, self.mean.size))
         return reflect_into_box(self.mean + self.deviation * multiply_by_lower(self._draws, self._factor))
 
@@ -104,8 +104,8 @@ class Gaussian:
         rank: function that ranks scores, as for `BoxSearch`.
         noise: (n,) random numbers that break ties.
 
-        Points that all have the same rank show no direction. The Gaussian then only becomes narrower (once it has a
-        best point), and is given up after too many such evaluations.
+        If all points have the same rank, they show no direction. The Gaussian then only becomes narrower (once it has a
+        best point), and it is done after too many such evaluations.
         """
         self.evaluations += len(points)
         ranks = rank(scores)
@@ -169,7 +169,15 @@ class Gaussian:
 class Multistart(BoxSearch):
     """Many searches with one Gaussian each, from starts of many places and widths.
 
-    They share the evaluations, in slices: after each slice the same search continues, or another one gets its turn.
+    The searches share the evaluations, in slices: after each slice the same search continues, or another one gets its
+    turn.
+
+    The arguments are the same as for `BoxSearch`; population is the largest generation, reached after many starts.
+    First samples, if given, are evaluated first; the mean and the deviations of their better half replace the centre of
+    the box and its scale.
+
+    samples and scores are the best sample of all and the last generation, (n, d) and (n, c), best first; empty before
+    the first `tell`.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -179,13 +187,6 @@ class Multistart(BoxSearch):
     ...     search.tell((samples**2).sum(axis=1)[:, None])
     >>> bool(search.scores.min() < 1e-6)
     True
-
-    The arguments are the same as for `BoxSearch`; population is the largest generation, reached after many starts.
-    First samples, if given, are evaluated first, and the mean and the deviations of their better half replace the
-    centre of the box and its scale.
-
-    samples and scores are the best sample of all and the last generation, (n, d) and (n, c), best first; empty before
-    the first `tell`.
     """
 
     def __init__(
@@ -270,9 +271,8 @@ class Multistart(BoxSearch):
         """Return True if a search may continue at once with another slice of evaluations.
 
         It must be in the better half of the searches that have reached the same width, by their results at that width.
-        The best search of all has to wait for its turn, so that half of the evaluations go to other searches. A search
-        that is done, that is the only one, or that has used more than `MAX_EVALUATION_FRACTION` of all evaluations has
-        to wait, too.
+        The best search of all always waits for its turn, so that half of the evaluations go to other searches. A search
+        also waits if it is done, is the only one, or has used more than `MAX_EVALUATION_FRACTION` of all evaluations.
 
         The width and the best scores of the search are added to its curve, unless it has found nothing yet.
         """

@@ -1,9 +1,9 @@
 """Sampling with niches: many groups of variables, each with a mixture of Gaussians around its best samples.
 
-Where `planner.optimisers.umda` fits one Gaussian to each variable, the density of a group here is a sum of Gaussians
-around its selected samples (Bosman and Thierens, "IDEAs based on the normal kernels probability density function",
-Utrecht University UU-CS-2000-11). Selection keeps niches apart by clearing (Petrowski, "A clearing procedure as a
-niching method for genetic algorithms", ICEC 1996), so that several routes around an obstacle coexist.
+`planner.optimisers.umda` fits one Gaussian to each variable. Here the density of a group is a sum of Gaussians around
+its selected samples (Bosman and Thierens, "IDEAs based on the normal kernels probability density function", Utrecht
+University UU-CS-2000-11). Selection keeps niches apart by clearing (Petrowski, "A clearing procedure as a niching
+method for genetic algorithms", ICEC 1996), so that several routes around an obstacle coexist.
 """
 
 from collections.abc import Callable
@@ -77,10 +77,11 @@ class NicheSampling:
     def draw_next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
     ) -> Floats:
-        """Return the next samples (g, count, d): the elite, the best of each niche, and new ones around them.
+        """Return the next samples (g, count, d): elite, best sample of each niche, and new ones around them.
 
         rows: (g, n, d) samples.
         costs: (g, n) costs of the samples.
+        count: number of samples of each group to return.
         deviation: (d,) standard deviations of new samples.
         max_cost: maximum cost of a selected sample.
         elite: (g, d) one sample of each group, such as its best so far. It is always selected and comes first.
@@ -156,9 +157,7 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample differs enough from every other sample.
-
-    It has to differ from each by the clearing radius or more, in at least one variable.
+    """Return True if a sample differs from each other sample by the clearing radius or more in some variable.
 
     row: (d,) the sample.
     other_rows: (n, d) the other samples.

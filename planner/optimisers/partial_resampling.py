@@ -1,19 +1,19 @@
 """Estimation of distribution that redraws only a part of the variables of each sample.
 
-A new sample of a whole distribution loses what its parent had right in variables that do not matter to the others.
-Here every sample keeps a part of its variables. The others are drawn around one of the best samples, at a distance that
-has the covariance of the population; a sample replaces its parent only if it is better.  The redrawn variables of half
-of the samples are neighbours, because the variables of neighbouring waypoints often have to change together.
+A sample whose variables are all redrawn loses the good values of its parent, also in variables that do not influence
+the others. Here every sample keeps a part of its variables. The others are drawn around one of the best samples, at a
+distance that has the covariance of the population; a sample replaces its parent only if it is better. In half of the
+samples the redrawn variables are neighbours, because the variables of neighbouring waypoints often have to change
+together.
 
 The fraction of redrawn variables and the width of the distribution follow those of successful samples, as the
 parameters of adaptive differential evolution do (Zhang and Sanderson, "JADE: adaptive differential evolution with
-optional external archive", IEEE Transactions on Evolutionary Computation 13, 2009).  The difference of two samples
-takes the place of a Gaussian draw, as in differential evolution (Storn and Price, Journal of Global Optimization 11,
-1997).
+optional external archive", IEEE Transactions on Evolutionary Computation 13, 2009). The difference of two samples takes
+the place of a Gaussian draw, as in differential evolution (Storn and Price, Journal of Global Optimization 11, 1997).
 
 When a population no longer improves, a Gaussian with full covariance (`planner.optimisers.multistart.Gaussian`) refines
 its best sample, also along a curved valley. Then the search starts again with twice the population (after Auger and
-Hansen, "A restart CMA evolution strategy with increasing population size", CEC 2005).  Only ranks are used.
+Hansen, "A restart CMA evolution strategy with increasing population size", CEC 2005). Only ranks are used.
 """
 
 import math
@@ -165,22 +165,25 @@ class PartialResampling(BoxSearch):
         return points[order], scores[order]
 
     def _draw_from_gaussian(self, gaussian: Gaussian) -> None:
-        """Draw the next generation of the refining Gaussian."""
+        """Draw the next samples from the refining Gaussian, scaled and clipped to the box."""
         samples = self.lower + gaussian.draw(self._rng) * (self.upper - self.lower)
         self._pending_samples = np.clip(samples, self.lower, self.upper)
 
     def _store(self, points: Floats, scores: Floats) -> None:
-        """Store the best sample of all starts, and behind it a generation (n, d) with scores (n, c), best first."""
+        """Set `samples` and `scores` to the best sample of all starts, followed by a generation.
+
+        points, scores: (n, d) and (n, c), the generation, best first.
+        """
         if self._best is None or self._rank(np.stack([self._best[1], scores[0]]))[1] == 0:
             self._best = points[0].copy(), scores[0].copy()
         self.samples = np.concatenate([self._best[0][None], points])
         self.scores = np.concatenate([self._best[1][None], scores])
 
     def _draw(self) -> None:
-        """Draw a new sample for each member of the population, which is sorted.
+        """Draw a new sample for each member of the sorted population.
 
         The sample keeps a part of the variables of its member. The others are redrawn around one of the best members,
-        which is moved by the difference of two random members, times a width.
+        displaced by the difference of two random members times a width.
         """
         count = len(self._points)
         points = (self._points - self.lower) / (self.upper - self.lower)

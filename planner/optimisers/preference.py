@@ -2,10 +2,10 @@
 
 Fonseca and Fleming, "Multiobjective optimization and multiple constraint handling with evolutionary algorithms", IEEE
 Transactions on Systems, Man, and Cybernetics A 28, 1998. Levels are in order of priority. Let U be the components of a
-level in which u violates its goal. Then u is preferred to v if u dominates v on U; or if they are equal on U and either
-v violates a goal outside U, or u is preferred to v at the next level (at the lowest: u dominates v on the components
-that satisfy their goals). A component without a goal is treated as violated (goal -inf), so that for a level without
-goals U is all its components.
+level in which u violates its goal. Then u is preferred to v in two cases: u dominates v on U; or they are equal on U,
+and v violates a goal outside U or u is preferred to v at the next level. At the lowest level the last condition is that
+u dominates v on the components that satisfy their goals. A component without a goal is treated as violated (goal -inf),
+so that for a level without goals U is all its components.
 """
 
 from collections.abc import Sequence
@@ -41,12 +41,14 @@ class Level:
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Rank each row of scores (n, c) by the number of rows that are preferred to it, (n,).
+    """Rank each row of scores (n, c) by the number of rows that are preferred to it, (n,); 0 is best.
+
+    levels: priority levels, highest priority first.
 
     Every component is first raised to its goal, so that no row is below a goal. The rule "u dominates v on U, or is
     equal there and v violates a goal outside U" then becomes Pareto dominance on the level, because a component outside
-    U is at its goal. Only rows that are equal on a level are compared on the next level. Each level is therefore one
-    dominance count within groups of ties.
+    U is at its goal. Only rows that are equal on a level are compared on the next level, so that each level only counts
+    the dominators of each row within its group of ties.
 
     >>> levels = Level((0,), (0.0,)), Level((1,), (NO_GOAL,))
     >>> ranks(np.array([[0.0, 9.0], [1.0, 2.0], [0.0, 3.0]]), levels).tolist()  # those that meet the goal come first
@@ -170,7 +172,7 @@ def _precedes(table: Floats, first_row: int, width: int, candidate: int, other: 
 def _add_dominator_counts(
     rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, candidate_ranks: Ints
 ) -> None:
-    """Count the candidates that dominate each candidate of a tied group; add to `candidate_ranks`.
+    """Add to each candidate of a tied group the number of candidates in the group that dominate it.
 
     rows: (c, n) scores, one column per candidate; only the first `width` rows are compared.
     width: number of scores of the priority level.
@@ -178,7 +180,7 @@ def _add_dominator_counts(
         candidates can dominate.
     order: number of the candidate in each column, (n,).
     scratch: working memory, (n,); its values do not matter, and are overwritten.
-    candidate_ranks: rank of each candidate by its number, (n,).
+    candidate_ranks: rank of each candidate by its number, (n,); updated.
 
     An earlier candidate dominates if it is nowhere higher. Equal candidates do not dominate each other, and get the
     same count.
@@ -205,7 +207,10 @@ def _add_dominator_counts(
 
 @inner
 def _count_at_most(values: Floats, limit: float) -> int:
-    """Count the values not above the limit, without branches, so that the loop is vectorised."""
+    """Return the number of values not above a limit.
+
+    The loop has no branches, so that it is vectorised.
+    """
     count = 0
     for k in range(values.size):
         count += 1 if values[k] <= limit else 0
@@ -214,7 +219,7 @@ def _count_at_most(values: Floats, limit: float) -> int:
 
 @inner
 def _clear_marks_above(values: Floats, limit: float, marks: Ints) -> None:
-    """Set the marks of values above the limit to 0; leave the other marks."""
+    """Set the marks of values above a limit to 0, and leave the other marks as they are."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 

@@ -73,10 +73,10 @@ class Umda(BoxSearch):
         self._pending_samples = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples of independent Gaussians that are fitted to the selected samples.
+        """Draw samples (count, d) from independent Gaussians that are fitted to the selected samples.
 
         A Gaussian has the mean and the standard deviation (1/N, not less than the floor) of the selected samples along
-        its direction. What lies outside the box is redrawn, and finally clipped.
+        its direction. Values outside the box are redrawn, and finally clipped.
         """
         selected = self.samples if self._basis is None else _project(self.samples, self._basis)
         mean, deviation = selected.mean(axis=0), selected.std(axis=0)
@@ -92,7 +92,7 @@ class Umda(BoxSearch):
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
         """Draw `count` samples, and redraw those outside the box; clip those that stay outside.
 
-        draw: function that draws the given number of samples.
+        draw: function that draws the given number of samples (n, d).
         """
         samples = draw(count)
         outside_rows = np.flatnonzero(((samples < self.lower) | (samples > self.upper)).any(axis=1))

@@ -25,11 +25,12 @@ class Algorithm:
     encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
     graded: scores violations by amount along the whole path, and ranks kill exposure before length.
     smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel, so
-    that neighbouring waypoints move together.
+        that neighbouring waypoints move together.
     seeded: starts from routes over grids of the map, improved by a pattern search.
-    final_shortening: finally shortens the best path; among zones, or if that fails, moves all its waypoints at once.
+    final_shortening: shortens the best path at the end; if there are zones, or if shortening fails, moves all its
+        waypoints at once instead.
     optimiser: name of an optimiser in `planner.optimisers`; "waypoints" is
-    `planner.search.generations.run_waypoint_generations`.
+        `planner.search.generations.run_waypoint_generations`.
     """
 
     name: str
@@ -145,7 +146,7 @@ DEFAULT = "fda-seeded"
 
 
 def algorithm_lines() -> str:
-    """Return the name and the summary of each algorithm, one line per algorithm.
+    """Return the name and the summary of each algorithm as text, one line per algorithm.
 
     >>> print(algorithm_lines().splitlines()[3])
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, without initial paths
@@ -157,7 +158,7 @@ def algorithm_lines() -> str:
 def find_algorithm(name: str | None, source: str) -> Algorithm:
     """Return the algorithm with a name, or the default algorithm for None.
 
-    source: origin of the name, which stands at the beginning of the error message.
+    source: where the name comes from, for the error message, e.g. the name of the scenario or "--algorithm".
 
     Raises ScenarioError for an unknown name.
 

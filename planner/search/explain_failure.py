@@ -1,9 +1,9 @@
 """Explain why a search found no feasible path, by obstacles that block all routes and limits of the method.
 
-`explain_failure` collects lines for the user. It searches for lines across the map where ground and clearance reach the
-ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
-grid (connected components); for vertical bands that the required margins close; and for missiles that leave no path, as
-`planner.search.infeasibility_proof` proves.
+`explain_failure` collects lines for the user. It looks for lines across the map on which the ground plus clearance
+reaches the ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on
+a coarse grid (connected components); for vertical bands that the required margins close; and for missiles that leave no
+path, as `planner.search.infeasibility_proof` proves.
 """
 
 import itertools
@@ -41,8 +41,8 @@ _GROUND_CELL = -2
 class SeparatingZones(NamedTuple):
     """Zones that separate start and destination.
 
-    zones: names of the zones. They are adjacent to the cells that can be reached from the start and to those that can
-    be reached from the destination, or to either of them if no zone is adjacent to both.
+    zones: names of the zones that are adjacent both to the cells that can be reached from the start and to the cells
+        that can be reached from the destination; if there are none, of the zones that are adjacent to either.
     cell_side: side of the cells of the examined grid, m.
     """
 
@@ -51,13 +51,12 @@ class SeparatingZones(NamedTuple):
 
 
 def find_separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Find the zones that separate start and destination.
+    """Find the zones that separate start and destination, on a grid of cells at several altitudes.
 
-    Space is divided into a grid of cells, at several altitudes. Zones close cells, and start and destination are
-    separated if no chain of open cells connects them. A gap narrower than a cell is treated as closed. Missiles and the
-    aircraft's climb are ignored.
+    Zones close cells, and start and destination are separated if no chain of open cells connects them. A gap narrower
+    than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
-    Returns None if nothing separates them, if the ground alone does, or without terrain or zones.
+    Returns None if they are connected, if the ground alone separates them, or without terrain or zones.
 
     >>> from world.scenario import load_scenario
     >>> find_separating_zones(load_scenario("tight")) is None
@@ -292,9 +291,9 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _describe_walls(scenario: Scenario) -> list[str]:
-    """Return a line if the ground, or ground and missiles together, block the whole map's width; else [].
+    """Return a line if the ground, or ground and missiles together, block the map's whole width; else [].
 
-    Lines across the map are tested, perpendicular to the direct line from start to destination.
+    The tested lines cross the map at right angles to the direct line from start to destination.
     """
     terrain = scenario.terrain
     if terrain is None:
@@ -332,7 +331,10 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 
 
 def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map: distance of the line from the start (m), and its points (n, 2), m."""
+    """Yield lines across the map, at right angles to the direct line from start to destination.
+
+    Each is the distance of the line from the start, m, and its points on the map, (n, 2) m.
+    """
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-half_width, half_width, POINTS_ACROSS)
@@ -369,7 +371,7 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Return a line if it is proven that missiles, ground or an altitude limit block every path; else []."""
+    """Return a line if missiles, ground or an altitude limit provably block every path; else []."""
     data, ceiling = problem.certified, "the ceiling"
     missiles, max_level_altitude = blocking_missiles(data), highest_level_flight(data)
     if missiles is None:

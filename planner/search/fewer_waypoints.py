@@ -13,7 +13,9 @@ from planner.search.algorithms import find_algorithm, limits_for
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
-    """Remove the waypoints that are not needed for a plan's safety; this never makes the path longer.
+    """Remove the waypoints that a plan's safety does not need; this never makes the path longer.
+
+    limits: limits of the plan's path, without those of its algorithm.
 
     The waypoints with the smallest detours are removed first. The path keeps the distance from missiles that plans
     require, or the plan's own distance if that is smaller.

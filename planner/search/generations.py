@@ -5,9 +5,10 @@
 `run_waypoint_generations` is a factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary
 algorithm for the optimization of additively decomposed functions", Evolutionary Computation 7, 1999) over the paper's
 subspaces: "to find one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent
-waypoints satisfy all the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).
+    waypoints satisfy all the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).
+
 UMDA ranks whole paths, so that a good waypoint is lost with a bad path. Here every interval has a population of
-candidates; all combinations are evaluated at once by dynamic programming (`planner.seeding.waypoint_chains`), and each
+candidates. Dynamic programming evaluates all their combinations at once (`planner.seeding.waypoint_chains`), and each
 candidate is ranked by the best path through it. The best candidates of each niche form the interval's next density
 (`planner.optimisers.niche_sampling`), so that routes on several sides of the obstacles coexist until one is shorter.
 """
@@ -50,7 +51,7 @@ def run_path_generations(search: Search, population: int, generations: int, star
     generations: maximum number of further generations, each of half as many samples.
     starts: vectors (s, d) around which the first population is sampled.
 
-    A seeded search ends earlier if it no longer improves, or after a fraction of these evaluations.
+    A search with seeds ends earlier if it no longer improves, or after a fraction of these evaluations.
     """
     encoding, algorithm = search.encoding, search.algorithm
     previous_evaluations = search.evaluations
@@ -248,14 +249,14 @@ def _later_candidate_count(first_count: int) -> int:
 
 
 def _limit_generations(search: Search, generations: int) -> int:
-    """Return the requested number of generations, at most the maximum of a search of single waypoints."""
+    """Return the requested number of generations, at most the maximum of `run_waypoint_generations`."""
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
 def count_remaining_legs(search: Search) -> int:
     """Return the number of legs that the search may still evaluate.
 
-    It is not limited (`ALL_LEGS`) if the scenario states a budget of evaluations.
+    If the scenario states a budget of evaluations, legs are not limited, and the result is `ALL_LEGS`.
     """
     settings = search.problem.scenario.planner
     if settings.budget is not None:
@@ -269,9 +270,9 @@ def may_try_again(search: Search) -> bool:
 
 
 def _count_attempt_legs(search: Search) -> int:
-    """Return how many legs there are between the candidates of neighbouring intervals, in all generations.
+    """Return the number of legs between candidates of neighbouring intervals that a first attempt evaluates.
 
-    The number is that of the first attempt.
+    The legs of all generations are counted, without the savings of a bound on the cost.
     """
     settings = search.problem.scenario.planner
     first_count = _first_candidate_count(search, settings.population)
@@ -288,13 +289,13 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Find the best path through each waypoint of some paths (k, w, 3), whose waypoints may be mixed.
-
-    Only paths below an upper bound on the cost are searched, because without a bound almost every leg would have to be
-    evaluated. If there is none, a larger bound is tried. If few legs may still be evaluated, the last search, without a
-    bound, only joins the first candidates.
+    """Find the best path through each waypoint of some paths (k, w, 3), also across different paths.
 
     slack: fraction by which the first bound exceeds the cost of the best safe path, if there is one.
+
+    Only paths below an upper bound on the cost are searched, because without a bound almost every leg would have to be
+    evaluated. If no path is below the bound, a larger bound is tried. If few legs may still be evaluated, the last
+    search, without a bound, only joins the first candidates.
     """
     data, space = search.problem.search, search.problem.space
     straight_length = math.dist(space.start, space.destination)
@@ -309,9 +310,11 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
                 1, math.isqrt(int(UNBOUNDED_LEG_FRACTION * max(0, remaining_legs - legs)) // (len(candidates) - 1))
             )
             candidates = np.ascontiguousarray(candidates[:, :max_candidates])
-        chains = waypoint_chains(data, candidates, bound * straight_length, search.pause, max(1, remaining_legs - legs))
+        chains = waypoint_chains(
+            data, candidates, bound * straight_length, search.check_stop, max(1, remaining_legs - legs)
+        )
         legs += chains.legs
         if chains.cost[1:-1].min() <= bound * straight_length < math.inf or legs >= remaining_legs:
             break
-        search.pause()
+        search.check_stop()
     return chains._replace(legs=legs)

@@ -63,13 +63,12 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_waypoint(data: ProblemArrays) -> float:
-    """Return the highest altitude that a waypoint may have, m; inf as for `highest_level_flight`.
+    """Return the highest altitude that a waypoint may have, m; inf if `highest_level_flight` finds no limit.
 
     The leg to the highest waypoint is level or climbs, unless this waypoint is the start. Therefore the highest
-    waypoint is not above the start, or the aircraft can climb there by the margin to the slope limits, `angle_margin`.
-
-    The steepest climb over the ground is in a headwind w. At the airspeed V, it is as steep as the margin m if the
-    climb through the air is m - asin(w / V sin m).
+    waypoint is not above the start, or the aircraft can climb there at least as steeply as the margin to the slope
+    limits, `angle_margin`. Over the ground the climb is steepest in a headwind w. At the airspeed V, its slope equals
+    the margin m if the climb angle through the air is m - asin(w / V sin m).
     """
     headwind_ratio = min(1.0, _max_wind_speed(data) / true_airspeed(data.aircraft, data.floor))
     air_angle = data.angle_margin - math.asin(headwind_ratio * math.sin(data.angle_margin))
@@ -79,10 +78,10 @@ def highest_waypoint(data: ProblemArrays) -> float:
 def highest_level_flight(data: ProblemArrays, min_climb: float = 0.0) -> float:
     """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
-    Return inf if there is no such limit below the ceiling, or if the wind is too strong to hold a course. The limit
-    applies only if both slope limits are the aircraft's limits, as in `planner.evaluation.leg_constraints`.
-
     min_climb: climb angle through the air that must be possible, rad; 0 for level flight.
+
+    The result is inf if there is no such limit below the ceiling, if a slope limit is stated as a number, or if the
+    wind is too strong to hold a course; it is -inf if the aircraft cannot fly level at any altitude.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
@@ -117,9 +116,9 @@ def _max_wind_speed(data: ProblemArrays) -> float:
 def blocking_missiles(data: ProblemArrays) -> list[int] | None:
     """Return the indices of a minimal set of missiles that, with ground and ceiling, block every path.
 
-    The set is minimal in that each of its missiles is needed: groups of missiles are left out as long as the others
-    still block every path. The list is empty if ground and ceiling alone do. Returns None if it is not proven that
-    every path is blocked.
+    Missiles are left out in groups as long as the others still block every path, so that each missile of the set is
+    needed. The list is empty if ground and ceiling alone block every path. Returns None if it is not proven that every
+    path is blocked.
     """
     if not is_closed(data):
         return None
@@ -140,13 +139,14 @@ def blocking_missiles(data: ProblemArrays) -> list[int] | None:
 
 @compiled
 def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
-    """Return the result of `is_closed` for the missiles that are True in `missiles`.
+    """Return True if it is proven that ground, ceiling and the selected missiles block every path.
 
-    For each column a list of closed altitude ranges is built: first the ground, then each sphere. Then a search over
-    the open ranges of neighbouring columns looks for the destination.
-
+    missiles: (m,) True for each of `data.threats` to consider.
     column_size: side of the square columns, m.
     margin: required distance from the missiles' spheres, m.
+
+    A list of closed altitude ranges is built for each column: first the ground, then each sphere. Then a search over
+    the open ranges of neighbouring columns looks for the destination.
     """
     columns = max(1, math.ceil((data.east - data.west) / column_size))
     rows = max(1, math.ceil((data.north - data.south) / column_size))
@@ -164,7 +164,7 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
         if missiles[k] and data.threats[k].kill_radius > 0.0:
             missile = data.threats[k]
             position = missile.east - data.west, missile.north - data.south
-            _close_sphere(
+            _close_altitudes_in_sphere(
                 position[0],
                 position[1],
                 missile.up,
@@ -209,7 +209,7 @@ def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> f
 
 
 @inner
-def _close_sphere(
+def _close_altitudes_in_sphere(
     east: float,
     north: float,
     altitude: float,
@@ -219,7 +219,7 @@ def _close_sphere(
     range_tops: Floats,
     range_counts: Ints,
 ) -> None:
-    """Close the altitudes of columns that are completely inside a sphere.
+    """Close the altitudes of each column at which the whole column is inside a sphere.
 
     east, north, altitude, radius: sphere, m, with its centre relative to the map's south-western corner.
     column_size: side of a column, m.

@@ -40,9 +40,8 @@ VERTICAL_OFFSET_M = 20.0
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
     """Call the kernels of one part of planning once, so that they get compiled.
 
-    part: a name in `PARTS`, or `FRONT`.
-
-    scenario: a small scenario is sufficient, because the result is discarded.
+    part: a name in `PARTS`, or `FRONT`; KeyError is raised for any other.
+    scenario, limits: any small problem; the results are discarded.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario

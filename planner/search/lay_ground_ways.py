@@ -1,9 +1,9 @@
 """Lay out a plan's departure from home to its first waypoint, and its approach from the last waypoint to the strip.
 
-Both are searched among a few thousand paths of straight legs, shortest first: launch courses or finals, with corners
-and laps between them and the plan.  A path is accepted if it passes the plan's certificate (turns, slopes, clearance,
-missiles, zones, bounds), and if the parts below the certificate's clearance are free, too: the climb from the ground
-and the glide to the landing point.  If no path is accepted, the plan's certificate reports the best one.
+Both are searched among a few thousand paths of straight legs, shortest first. A path consists of a launch course or a
+final, and of corners and laps between it and the plan. A path is accepted if it passes the plan's certificate (turns,
+slopes, clearance, missiles, zones, bounds), and if the parts below the certificate's clearance are free, too: the climb
+from the ground and the glide to the landing point. If no path is accepted, the plan's certificate reports the best one.
 """
 
 import math
@@ -133,7 +133,7 @@ class FinalModel(NamedTuple):
 def add_departure_and_approach(
     plan: Plan, limits: Limits, final_model: FinalModel, kept_departure: ClimbOut | None = None
 ) -> Plan:
-    """Add the departure and approach that a scenario requires to its plan, or a problem if none can be flown.
+    """Add the departure and approach that a scenario requires to its plan, or a problem if there is none.
 
     limits: limits of the plan.
     final_model: airspeed and slope of the autopilot on a final.
@@ -178,10 +178,12 @@ class _Site:
     """Plan and surroundings of a departure and an approach, and the problems that certify both.
 
     limits: limits within which the plan's algorithm plans.
-    problem: problem of the parts at the required clearance.
-    low_problem: problem of the parts below the required clearance, without margins to zones; of its certificate only
-    the distances from missiles and zones are used.
-    turn_radius: radius of the tightest turn, m.  turn_lengths: lengths that turns take of their legs.
+    home: (3,) m, on the ground.
+    problem: problem for the parts at or above the required clearance.
+    low_problem: problem for the parts below the required clearance, without margins to zones; its certificate is only
+        used for distances from missiles and zones.
+    turn_radius: radius of the tightest turn, m.
+    turn_lengths: lengths that turns take of their legs.
     """
 
     plan: Plan
@@ -223,18 +225,19 @@ class _Site:
         return slopes[0], slopes[1]
 
     def min_path_length(self, height_change: float, is_descent: bool) -> float:
-        """Return the length (m) of the shortest path on which the aircraft climbs or descends by a height (m).
+        """Return the shortest path length on which the aircraft can change its altitude by a height, m.
 
+        height_change: height to climb or descend, m.
         is_descent: True for a descent.
 
-        The length is inf if the aircraft cannot climb (or descend) on any course.
+        The length is inf if the aircraft cannot climb (or descend) on any of eight courses.
         """
         altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
         max_slope = max(self.slopes(course, altitude)[is_descent] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_path(self, path: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Certify a path, (n, 3) m, with a reduced required height near two points.
+        """Certify a path, (n, 3) m, for which the required height is reduced near two points.
 
         end_points: the two points, (3,) m. The required height is reduced near a point that is itself closer to the
             ground than required.
@@ -340,7 +343,7 @@ def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: fl
 
 
 class _BestRejected:
-    """Best rejected path, and the number of rejected paths, for a message."""
+    """Number of rejected paths, and the problem of the best of them, for a message."""
 
     def __init__(self) -> None:
         """Start without rejected paths."""
@@ -349,7 +352,8 @@ class _BestRejected:
     def add(self, certificate: Certificate | None) -> None:
         """Count a rejected path, and keep its problem if it has the largest margin so far.
 
-        A rejected path without a problem in its certificate is inside a missile's reach. None is not counted.
+        certificate: certificate of the path; None is not counted. A path that is rejected although its certificate has
+            no problem is inside a missile's reach.
         """
         if certificate is None:
             return
@@ -365,12 +369,12 @@ class _BestRejected:
 
 
 def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """Return the shortest accepted departure, or None and the reason why no departure is accepted.
-
-    A departure may circle before it leads to the plan's first waypoint; the smallest number of laps is tried first.
+    """Find the shortest accepted departure; return it and "", or None and the reason why none is accepted.
 
     site: plan, limits and terrain around home.
     launch: launch of the scenario, which may prescribe a course.
+
+    A departure may circle before it leads to the plan's first waypoint; the smallest number of laps is tried first.
     """
     data, first_waypoint = site.problem.certified, site.plan.waypoints[0]
     home_altitude, start_altitude = float(site.home[2]), float(first_waypoint[2])
@@ -408,15 +412,15 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
 def _make_departure(
     site: _Site, course: float, points: list[MapPoint], takeoff_altitude: float
 ) -> ClimbOut | Certificate | None:
-    """Make the departure over some points of the map; return it, or its certificate if it is rejected.
-
-    It is tried with several climb slopes, the steepest first, until it passes the certificate. If all are rejected, the
-    certificate of the last one is returned; None if the path is too short even for the steepest climb.
+    """Make the departure over some points of the map; return it, or a certificate if it is rejected.
 
     site: plan, limits and terrain around home.
     course: launch course, rad.
     points: east and north of the departure from home to the first waypoint, m.
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
+
+    It is tried with several climb slopes, the steepest first, until it passes the certificate. If all are rejected, the
+    certificate of the last one is returned; None if the path is too short even for the steepest climb.
     """
     next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
@@ -443,7 +447,7 @@ def _make_departure(
 class _Launch(NamedTuple):
     """Launch: course (rad), point where the take-off is complete, and end of the first leg.
 
-    drifted_ends: points where a slow take-off is complete in the least and in the strongest expected crosswind.
+    drifted_ends: points where a slow take-off is complete in the weakest and in the strongest expected crosswind.
     """
 
     course: float
@@ -452,7 +456,7 @@ class _Launch(NamedTuple):
     drifted_ends: tuple[MapPoint, ...]
 
     def fits(self, points: Sequence[MapPoint], turn_lengths: TurnLengths) -> bool:
-        """Return True if the first legs are long enough for their turns, also after a drifted take-off.
+        """Return True if the first legs are long enough for their turns, also after a take-off that drifts.
 
         points: home, end of the first leg, and the points after it.
         """
@@ -462,10 +466,10 @@ class _Launch(NamedTuple):
 def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
     """Return the launches clear of ground, missiles and zones, and the reason to state if there are none.
 
-    Each launch course is tried with first legs of several lengths.
-
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
     altitude: altitude for which the climb performance is computed, m AMSL.
+
+    Each launch course is tried with first legs of several lengths.
     """
     airspeed = site.limits.airspeed
     climb_time = takeoff_height / (_SLOW_TAKEOFF_SLOPE * airspeed)
@@ -532,7 +536,7 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
 def _list_departures(
     site: _Site, launches: Sequence[_Launch], laps: int
 ) -> Iterator[tuple[float, float, list[MapPoint]]]:
-    """Yield the cost (m), launch course and points of departures from home to the plan's first waypoint.
+    """Yield departures from home to the plan's first waypoint: cost (m), launch course (rad) and points.
 
     site: plan, limits and terrain around home.
     launches: the launches to try, with their courses.
@@ -590,13 +594,14 @@ class _Final(NamedTuple):
 
 
 def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) -> tuple[Descent | None, str]:
-    """Return the first accepted approach, or None and the reason why no approach is accepted.
+    """Find the first accepted approach; return it and "", or None and the reason why none is accepted.
+
+    site: plan, limits and terrain around the strip.
+    strip: landing strip of the scenario.
+    final_model: airspeed and slope at which the autopilot flies a final.
 
     The finals on all landing courses of the strip are tried in turn. An approach is accepted if a path leads from the
     plan's last waypoint to the final, and if a go-around clears the ground.
-
-    site: plan, limits and terrain around the strip.
-    final_model: airspeed and slope at which the autopilot flies a final.
     """
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
@@ -645,13 +650,13 @@ def _find_finals(
 ) -> tuple[list[_Final], str]:
     """Return the clear and flyable finals on a course, and the reason to state if there are none.
 
-    Finals that PX4 accepts come first, then the shortest ones.
-
     site: plan, limits and terrain around the strip.
     strip: landing strip, which may prescribe the length (m) and the slope (rad) of the final.
     course: landing course, rad.
     point: landing point, (3,) m.
     final_model: airspeed and slope at which the autopilot flies a final.
+
+    Finals that PX4 accepts come first, then the shortest ones.
     """
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.components_on_course(course, field_altitude)[0]
@@ -691,11 +696,11 @@ def _find_finals(
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
-    """Check a final for ground, missiles and zones; return its margin, m, and a text on its obstacle.
+    """Check a final for ground, missiles and zones; return a margin, m, and a text on its obstacle.
 
-    The margin is 0 and the text "" if the final is clear. Otherwise the margin is not positive, and the text completes
-    the sentence "a final approach ...". The glide is checked at its ground clearance and for missiles and zones from
-    the line-up's altitude down to the field; the level part before it needs a certificate.
+    The margin is 0 and the text "" if the final is clear. Otherwise the margin is at most 0, and the text completes the
+    sentence "a final approach ...". The glide must keep its ground clearance, and must be free of missiles and zones at
+    all altitudes from the line-up down to the field; the level part before it needs a certificate.
     """
     glide_start, point = final.final_waypoints[1], final.point
     distances, terrain_heights = _ground_profile(
@@ -726,9 +731,9 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 
 
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Find the shortest accepted path from the plan's end to the line-up of a final.
+    """Find the shortest accepted path from the plan's last waypoint to the line-up of a final.
 
-    Returns its corners between these two points, (n, 3) m, and ""; or None and the reason why no path is accepted.
+    Returns the corners between these two points, (n, 3) m, and ""; or None and the reason why no path is accepted.
     """
     waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
@@ -787,9 +792,9 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return the climb slope or the dive slope on a course times a factor, m per m.
+    """Return a fraction of the steepest climb or dive slope on a course, m per m.
 
-    factor: 0 to 1.
+    factor: the fraction, 0 to 1.
     is_descent: True for the dive slope.
     altitude: m AMSL.
     course: rad.

@@ -31,7 +31,7 @@ from planner.plan import Objective, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
-from planner.search.seeds import with_waypoints
+from planner.search.seeds import halve_longest_legs
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
@@ -97,7 +97,7 @@ NOTICEABLE_CLEARANCE_M = 1.0
 class FrontPlan:
     """Plan of a front, and its values in SI units: m, s, m, s, J (NaN if the aircraft's power is unknown).
 
-    exposure: density of detection by radars, integrated over the flight time; not the time inside their range.
+    exposure: detection density of the radars, integrated over the flight time, in seconds at full density.
     clearance: least height above ground of the legs and fly-by arcs.
     """
 
@@ -111,16 +111,16 @@ class FrontPlan:
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Front:
-    """Plans, the shortest first; no plan is better than another plan in every objective.
+    """Plans of a Pareto front, the shortest first; no plan is better than another plan in every objective.
 
     Of any two plans at least one gains more than `noticeable_gains` over the other in some objective.
 
     asked: requested maximum number of plans.
     fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
-    default: the default planner's plan and its values; another plan may be a little shorter.
-    reference: (4,) reference point of the hypervolume, clearance negated; plans beyond it are ignored.
-    evaluations: paths evaluated, without the default plan's evaluations.
-    refused: number of other plans that were not safe once they were completed.
+    default: the default planner's plan and its values; a plan of the front may be a little shorter.
+    reference: (4,) reference point of the hypervolume, with negated clearance; plans beyond it are ignored.
+    evaluations: number of evaluated paths, without the default plan's evaluations.
+    refused: number of plans that were discarded because they were not safe once they were completed.
     ended: "completed", or the reason why the search ended early: "budget" or "interrupted".
     """
 
@@ -182,14 +182,15 @@ def plan_front(
 ) -> Front:
     """Compute up to `count` plans of a Pareto front.
 
-    The front is empty if the default planner finds no safe plan. It has fewer than `count` plans if no further plan has
-    a noticeable gain over the others. The fourth objective is energy. It is time if the scenario's objective is time,
-    or if the aircraft's power is unknown.
-
     default: the completed default plan; None to plan it here, and to finish it like the others.
     waypoints: number of waypoints of the other plans during the search, including both ends; None for the number in the
         default plan.
     finish: completes a plan, for example with departure and approach; only plans that are then safe enter the front.
+    generations: maximum number of generations.
+
+    The front is empty if the default planner finds no safe plan. It has fewer than `count` plans if no further plan has
+    a noticeable gain over the others. The fourth objective is energy. It is time if the scenario's objective is time,
+    or if the aircraft's power is unknown.
 
     The same scenario, limits, count and seed give the same front.
 
@@ -203,7 +204,7 @@ def plan_front(
     task = front_task(scenario, limits)
     if default is None:
         default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
-    path = with_waypoints(default.waypoints, waypoints or 0)
+    path = halve_longest_legs(default.waypoints, waypoints or 0)
     task = fit_margins(task, path)
     default_plan = _with_values(task, default)
     reference = reference_point(task, default_plan)
@@ -225,12 +226,14 @@ def plan_front(
 
 
 class FrontTask(NamedTuple):
-    """Problem with several objectives.
+    """Planning problem with the four objectives of a front.
 
-    scored: the problem with margins between the search's and the certificate's: shortening ends at the margins of a
-        search, within the tolerance of the certificate.
-    frame: frame in which waypoints are sampled. energy: cost of energy, or None if the power is unknown.
-    fourth: "time" or "energy". travel: cost of this fourth objective.
+    scored: the problem with margins between the margins of a search and of the certificate, because shortening ends at
+        the margins of a search only within a tolerance.
+    frame: frame in which waypoints are sampled.
+    energy: cost function for energy, or None if the power is unknown.
+    fourth: "time" or "energy".
+    travel: cost function of this fourth objective.
     """
 
     problem: Problem
@@ -303,7 +306,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce a task's margins to the margins of the default path (w, 3), so that other paths may be as tight."""
+    """Reduce a task's margins until the default path (w, 3) keeps them, so that other paths may be as tight."""
     for fraction in MARGIN_FRACTIONS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():
@@ -314,7 +317,8 @@ def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     """Return the reference point of the hypervolume, (4,); plans beyond it are ignored.
 
-    It has 1.5 times the length, the exposure, and the time or energy of the default plan, and the required clearance.
+    Its length, exposure, and time or energy are `MAX_LENGTH_RATIO` or `MAX_EXPOSURE_RATIO` times the default plan's
+    values; its clearance is the required clearance, negated.
     """
     length, exposure, _, fourth = _objective_row(default, task.fourth)
     max_exposure = max(MIN_EXPOSURE_S, MAX_EXPOSURE_RATIO * exposure)
@@ -323,7 +327,7 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
-    """Return a plan with its values; the clearance is computed exactly, not at samples."""
+    """Add the values to a plan; the clearance is computed exactly, not at samples."""
     row = task.values(np.array(plan.waypoints)[None])[0]
     clearance = least_height(task.problem.certified, plan.waypoints)
     return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
@@ -333,15 +337,17 @@ def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
 
 
 def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
-    """Yield paths (w, 3) from which the search begins, for various preferences.
+    """Yield paths (w, 3) from which the search of a front begins.
 
-    They are the default path (w, 3), and shortened paths. The shortened paths are made of the default path and of
-    routes on all sides of the missiles and radars. Shortening ignores zones; if there are any, the routes are yielded,
-    too.
+    default: (w, 3) path of the default plan.
 
-    Each radar is a missile sphere for each of `RADAR_FRACTIONS` of its detection radius. The buffer is at least one of
-    `CLEARANCE_FRACTIONS` of the spare height above the required clearance, which is the smaller one of both ends. The
-    cost is the cost of the problem, and then the cost of the fourth objective.
+    The first is the default path. The others are made of it, and of routes on all sides of the missiles and radars, by
+    shortening under various preferences. Shortening ignores zones; if there are any, the unshortened routes are
+    yielded, too.
+
+    A preference combines three settings. Each radar becomes a missile sphere with one of `RADAR_FRACTIONS` of its
+    detection radius. The clearance buffer is at least one of `CLEARANCE_FRACTIONS` of the spare height of the lower end
+    above the required clearance. The cost is the cost of the problem or of the fourth objective.
     """
     yield default
     count, all_threats = len(default), task.problem.scenario.threats
@@ -477,9 +483,12 @@ def noise_directions(inner_count: int, scales: Floats) -> Floats:
 
 
 def noticeable_gains(default: FrontPlan, fourth: str) -> Floats:
-    """Return the smallest gain over the default plan that counts as a different plan, for each objective, (4,).
+    """Return the smallest gain in each objective that makes a plan a separate choice, (4,).
 
-    The objectives are length (m), radar exposure (s), clearance (m), and the one that `fourth` names.
+    default: the default plan, of which some gains are fractions.
+    fourth: "time" or "energy".
+
+    The objectives are length (m), radar exposure (s), clearance (m), and time (s) or energy (J).
     """
     length, exposure, _, fourth_value = _objective_row(default, fourth)
     exposure_gain = NOTICEABLE_EXPOSURE_FRACTION * max(MIN_EXPOSURE_S, exposure)
@@ -494,12 +503,12 @@ def noticeable_gains(default: FrontPlan, fourth: str) -> Floats:
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
-    """Return the indices of objectives (n, m) that differ noticeably from every row chosen before.
+    """Return the indices of the objectives (n, m) that differ noticeably from every row chosen before.
 
     amounts: (m,) noticeable gains.
 
-    This is the additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002). A
-    row is omitted if an earlier row is worse by no more than the amounts in every objective.
+    A row is omitted if an earlier chosen row is worse by no more than the amounts in every objective. This is the
+    additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002).
 
     >>> distinct_rows(np.array([[1.0, 9.0], [1.1, 8.9], [2.0, 5.0], [9.0, 4.9]]), np.array([0.5, 0.5]))
     [0, 2]
@@ -519,13 +528,13 @@ def _certify_distinct(
     template: Plan,
     finish: Callable[[Plan], Plan],
 ) -> tuple[list[FrontPlan], int]:
-    """Return up to `count` distinct safe plans that cover the front, and the number of unsafe plans.
+    """Certify and complete distinct plans that cover the front; return up to `count` safe plans.
 
     default_plan: the completed default plan, which is included if no plan is better.
     template: plan from which all fields other than path, scores and certificate are copied.
     finish: completes a plan.
 
-    Each plan is certified and completed.
+    Also returns the number of plans that were not safe.
     """
     amounts, plans = noticeable_gains(default_plan, task.fourth), dict[int, FrontPlan]()
     remaining_rows = np.arange(len(search.vectors))

@@ -1,10 +1,11 @@
 """Plan a path: run an algorithm on a scenario and return the plan with its certificate.
 
-A seeded search tries the straight line first, then fits waypoints to grid routes, shortens the best, tries other sides
-of the obstacles, and runs generations of samples if no path is safe. If the certificate fails, up to two more attempts
-use finer grids, larger populations, a larger clearance buffer and a smaller margin to missiles. If no safe path exists
-in the straight frame, or only a long one, a lattice search looks for routes that turn back. If it is proven that no
-path exists, the search ends. Among zones, the whole search may be repeated with another number of waypoints.
+A seeded search tries the straight line first. Then it fits waypoints to grid routes, shortens the best path, tries
+other sides of the obstacles, and runs generations of samples if no path is safe. If the certificate fails, up to two
+more attempts use finer grids, larger populations, a larger clearance buffer and a smaller margin to missiles. If the
+search finds no safe path along the straight line, or only a long one, a lattice search looks for routes that turn back.
+If it is proven that no path exists, the search ends. Among zones, the whole search may be repeated with another number
+of waypoints.
 """
 
 import math
@@ -35,13 +36,13 @@ from planner.search.search_state import (
 )
 from planner.search.seeds import (
     MIN_DETOUR_FRACTION,
+    halve_longest_legs,
     may_turn_back,
     search_other_sides,
     search_turning_back,
     shorten_best,
     starting_vectors,
     try_straight_line,
-    with_waypoints,
 )
 from world.arrays import Floats
 from world.errors import ScenarioError
@@ -94,21 +95,21 @@ def plan_path(
 ) -> Plan:
     """Plan a path through a scenario; the same scenario, limits, algorithm and seed give the same plan.
 
-    >>> from planfly.workflow.uav import load_uav
-    >>> from world.scenario import load_scenario
-    >>> scenario = load_scenario("hard-07")
-    >>> plan = plan_path(scenario, load_uav(scenario).limits, seed=1)
-    >>> plan.safe, plan.waypoints.shape
-    (True, (10, 3))
-
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the algorithm of the scenario, or the default.
-    progress: called with generations done, generations in total, and a short text.
+    progress: called with the number of generations done, the total number, and a short text.
     stop: called every few hundredths of a second; a text that it returns ends the search, and the plan records it.
     improved: called with each path (w, 3), not yet certified, that meets the constraints better than all earlier paths.
     first_safe: True to end the search with the first safe path.
     previous: older path (w, 3) with the same ends and number of waypoints, from which the search starts.
 
     The certificate of a plan that is not safe states its problems. Raises ScenarioError for options that cannot work.
+
+    >>> from planfly.workflow.uav import load_uav
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> plan = plan_path(scenario, load_uav(scenario).limits, seed=1)
+    >>> plan.safe, plan.waypoints.shape
+    (True, (10, 3))
     """
     found_algorithm = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
@@ -124,7 +125,7 @@ def plan_path(
         search.lattice_routes = lattice_routes
         path, path_certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)
         if count < scenario.planner.waypoints:
-            path = with_waypoints(path, scenario.planner.waypoints)
+            path = halve_longest_legs(path, scenario.planner.waypoints)
             path_certificate = certify(problem, path)
         return search, path, path_certificate
 
@@ -160,8 +161,11 @@ def plan_path(
 def _needs_other_count(best: _Result, count: int) -> bool:
     """Return True if a search with another number of waypoints may find a better path than the best so far.
 
+    best: the best result so far.
+    count: the other number of waypoints.
+
     This is only the case among zones, where paths are not shortened. Another number is tried there if no path is safe,
-    unless it is proven that there is none. If the shortest path is sought, fewer waypoints are also tried if the best
+    unless it is proven that there is none. If the shortest path is sought, a smaller number is also tried if the best
     path is longer than the straight line.
     """
     search, waypoints, certificate = best
@@ -176,10 +180,11 @@ def _needs_other_count(best: _Result, count: int) -> bool:
 
 
 def _is_better(result: _Result, other: _Result) -> bool:
-    """Return True if the path of a search is better than that of another search.
+    """Return True if the path of one search is better than the path of another search.
 
-    A path that meets the goal of the search is better, and of two such paths the shorter one. If neither meets it, a
-    certified path is better, and of two alike the one further from missiles.
+    A path that meets the goal of its search is better than one that does not; of two such paths the shorter one is
+    better. If neither meets the goal, a certified path is better; if both or neither are certified, the path further
+    from missiles.
     """
     (search, waypoints, certificate), (_, other_waypoints, other_certificate) = result, other
     meets, other_meets = search.meets_goal(certificate), search.meets_goal(other_certificate)
@@ -269,10 +274,12 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    """Raise ScenarioError if a search makes no sense; the first reason found is stated.
+    """Raise ScenarioError if a search with these options makes no sense; the first reason found is stated.
 
-    It makes no sense in a wind that is too strong for the airspeed (m/s), with a population that is too large or larger
-    than the budget, or from or to a place inside a missile's kill radius.
+    airspeed: m/s.
+
+    The reasons are a wind that is too strong for the airspeed, a population that is too large or larger than the
+    budget, and a start or destination inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(

@@ -1,7 +1,7 @@
 """Construct paths of a few straight legs from one point and course to another, also with laps.
 
-The legs of a path must be long enough for its turns, and the path must gain or lose a height.  `candidate_chains` lists
-horizontal candidates, `measure_path` computes their lengths and checks the legs, and `climb_altitudes` and
+The legs of a path must be long enough for its turns, and the path must gain or lose a height. `candidate_chains` lists
+candidates on the map, `measure_path` computes their lengths and checks the legs, and `climb_altitudes` and
 `descent_altitudes` compute the altitudes of the corners.
 """
 
@@ -48,14 +48,14 @@ MAX_LAPS = 8
 def candidate_chains(
     start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[MapPoint]]:
-    """Yield lists of corners for a path from `start` to `end`, for a departure or an approach.
-
-    The path is flown from `start` over the corners to `end`. After its laps it has no corner or one near the start,
-    and up to two before the end: on the extended last leg, and on a base leg across it.
+    """Yield candidates for a path from `start` to `end`, as lists of corners, for a departure or an approach.
 
     course, end_course: course of the leg before `start`, and of the leg after `end`, rad.
     turn_radius: radius of the tightest turn, m.
     laps: number of square laps before the other corners.
+
+    The path is flown from `start` over the corners to `end`. After its laps it has no corner or one near the start, and
+    up to two before the end: on the extended last leg, and on a base leg across it.
     """
     # Square laps to the right and to the left, which begin and end at `start`.
     lap_chains: list[list[MapPoint]] = [] if laps else [[]]
@@ -106,7 +106,7 @@ class TurnLengths(NamedTuple):
     def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths that a turn (rad) takes up before and after its corner, m.
 
-        They are interpolated in the table. For a turn beyond the end of the table, they are about those of the table's
+        They are interpolated in the table. A turn beyond the end of the table gets about the lengths of the table's
         sharpest turn.
         """
         # Just before the last entry, so that an entry follows.
@@ -152,8 +152,10 @@ class PathMeasures(NamedTuple):
 def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathMeasures:
     """Measure the length and the turns of a path, and how much of each leg its turns take up.
 
+    points: east and north of the path, m; plain numbers for speed, because tens of thousands of paths are measured.
+
     The measurement ends at a turn that is too sharp, and at two points less than 1 m apart: such a path has the cost
-    inf and does not fit. The points are plain numbers for speed: tens of thousands of paths are measured.
+    inf and does not fit.
 
     >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(150.0)).fits
     True

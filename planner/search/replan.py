@@ -1,4 +1,4 @@
-"""Replan in flight: keep the flown legs and plan the rest again around newly known threats."""
+"""Replan in flight: keep the flown legs, and plan the rest again around newly known threats."""
 
 import math
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
-from planner.search.seeds import with_waypoints
+from planner.search.seeds import halve_longest_legs
 from planner.search.shared_budget import Search, SharedBudget
 from world.errors import MissionError
 from world.geometry import leg_courses
@@ -42,11 +42,12 @@ def replan(
 ) -> Plan:
     """Plan again from the start of leg `leg` of an old plan; keep the legs before it, which are flown.
 
-    scenario: includes the threats known now (`world.scenario.with_threats`). The turn at the first new waypoint is
-    measured from the course of the last flown leg. The search starts from the rest of the old plan, in addition to its
-    grid routes. The certificate is for the path ahead, the violations and objectives are for the whole path.
-
+    scenario: the scenario with the threats known now (`world.scenario.with_threats`).
     settle: function that completes the plan of the path ahead, before the flown legs are prepended.
+
+    The turn at the first new waypoint is measured from the course of the last flown leg. The search starts from the
+    rest of the old plan and from its usual grid routes. The certificate is for the path ahead, the violations and
+    objectives are for the whole path.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
@@ -68,7 +69,7 @@ def replan(
         raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{waypoint_count - 2}", file=scenario.name)
     check_same_mission(scenario, old_plan)
     _check_first_waypoint(scenario, old_plan, leg)
-    remaining_path = with_waypoints(old_plan.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
+    remaining_path = halve_longest_legs(old_plan.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
     course = scenario.start_course if leg == 0 else float(leg_courses(old_plan.waypoints)[leg - 1])
     settings = scenario.planner.model_copy(update={"waypoints": len(remaining_path)})
     remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)
@@ -104,7 +105,7 @@ def replan(
 
 
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
-    """Raise MissionError if the ends of a plan are not the ends of a scenario.
+    """Raise MissionError if a plan and a scenario have different ends.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario

@@ -2,9 +2,9 @@
 
 The search for the shortest path comes first, with its certificate. From that path, from the straight line and from
 routes on other sides of the obstacles, all waypoints then move at once so that the path costs less under the same
-constraints (`planner.seeding.shortening` with `planner.evaluation.travel_cost`): to altitudes and courses with a more
-favourable wind. A result replaces the shortest path if its certificate is as good and it costs less, so that a plan
-never costs more than the shortest path.
+constraints: to altitudes and courses with a more favourable wind (`planner.seeding.shortening` with
+    `planner.evaluation.travel_cost`). A result replaces the shortest path if its certificate is as good and it costs
+    less, so that a plan never costs more than the shortest path.
 """
 
 import math
@@ -68,13 +68,13 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
 
 
 def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights: TravelCost) -> _CertifiedPath:
-    """Return the path with the lowest time or energy that is found, and its certificate.
-
-    The shortest path itself is returned if the length is to be minimised, or if it does not meet the goal of the
-    search, or if no path that meets this goal is cheaper.
+    """Find the path with the lowest time or energy; return it and its certificate.
 
     shortest_path: the shortest path and its certificate.
     weights: weights of length, time and energy in the cost.
+
+    The shortest path itself is returned if the length is to be minimised, if it does not meet the goal of the search,
+    or if no path that meets this goal is cheaper.
     """
     minimises_length = weights.time == 0.0 and weights.energy == 0.0
     if minimises_length or not search.meets_goal(shortest_path[1]):
@@ -103,10 +103,10 @@ def _cost_or_inf(evaluation_data: ProblemArrays, path: Floats) -> float:
 
 
 def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
-    """Yield paths (w, 3) from which the search starts.
+    """Yield paths (w, 3) from which the search for a cheaper path starts.
 
     They are the shortest path, the shortest path with equal legs, and the straight line. With the encoding "rotated",
-    and without zones and a maximum height, there are also other routes.
+    and without zones and a maximum height, routes on other sides of the obstacles follow.
 
     Raises SearchEnded if the search must stop.
     """
@@ -129,7 +129,7 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
             spread=GROUND_SPREAD_STEPS,
             ratio=GRID_SPACING_RATIO,
         )
-        for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.pause):
+        for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.check_stop):
             yield resample(frame.to_world(route.points), count)
 
 
@@ -151,7 +151,9 @@ def _choose_cheaper(
     for extra_margin, slope_margin in EXTRA_MARGINS:
         stricter_data = evaluation_data._replace(angle_margin=evaluation_data.angle_margin + slope_margin)
         try:
-            path, evaluations = shorten_path(stricter_data, path, extra_margin=extra_margin, pause=search.pause)
+            path, evaluations = shorten_path(
+                stricter_data, path, extra_margin=extra_margin, check_stop=search.check_stop
+            )
         except SearchEnded:
             return best_path
         search.evaluations += evaluations

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.airspace.zone_limits import is_limited
-from planner.evaluation.airspace_scores import airspace_counts
+from planner.evaluation.airspace_scores import count_airspace_violations
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
@@ -97,17 +97,17 @@ NARROW_GAIN_FRACTION = 0.002
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
 MIN_MOVE_BUDGET = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
-WAYPOINTS_PER_PAUSE = 4000
-# Number of pauses that a stopped search without a result may still take to find its first route: some 100 ms.
-GRACE_PAUSES = 10
+WAYPOINTS_PER_CHECK = 4000
+# Checks after which a stopped search ends even if it has not found its first route: some 100 ms.
+GRACE_CHECKS = 10
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
-CERTIFICATES_PER_PAUSE = 4
+CERTIFICATES_PER_CHECK = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
     """Return a problem whose search may pass missiles at little more than the certificate's margin.
 
-    The tracking error across the path and the reserve for gusts are still kept.
+    The lateral tracking error and the reserve for gusts are still kept.
     """
     data = problem.search
     margin = data.tracking.across + problem.certified.kill_margin + NARROW_KILL_MARGIN_M
@@ -149,8 +149,8 @@ class Archive:
 
         vectors, scores: (n, d) paths and (n, 8) their scores.
 
-        As soon as one row is feasible, infeasible rows are dropped, because there may be thousands of them to rank. A
-        full archive accepts only rows that are better than its last row.
+        Once a path is feasible, infeasible paths are dropped, because there may be thousands of them to rank. A full
+        archive accepts only paths that are better than its last path.
         """
         is_kept = ~are_violated(scores)
         if self.is_feasible():
@@ -174,7 +174,7 @@ class Search:
 
     problem: the problem with the margins of the current attempt.
     algorithm, encoding, rng: settings and random generator of the search.
-    progress: called with generations done, generations in total, and a short text.
+    progress: called with the number of generations done, the total number, and a short text.
     stop_condition: called after each generation and each start; a returned text ends the search and gives the reason.
     first_safe: True to end with the first safe path.
     required_distance: distance (m) from missiles that the certificate of a finished path requires.
@@ -187,13 +187,13 @@ class Search:
     history: per generation, length ratio, kill exposure and violations of the best path.
     certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
-    intervals.
+        intervals.
     furthest_shortened: the certified path (w, 3) from shortening that is furthest from missiles among those outside all
-    spheres but closer than the goal allows, and its certificate.
+        spheres but closer than the goal allows, and its certificate.
     narrow_places: places (3,) where shortened paths remain too close to missiles, deepest first for each path.
     budget_exhausted: True if the budget is too small for another shortening.
     is_closed: True if it is proven that no safe path exists.
-    grace: remaining pauses of a search without a result, once it is asked to stop.
+    grace: number of further calls of `check_stop` that a stopped search without a result is allowed.
     lattice_routes: routes over lattices that were found so far; searches of the same problem share them.
     """
 
@@ -218,7 +218,7 @@ class Search:
     furthest_shortened: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
-    grace: int = GRACE_PAUSES
+    grace: int = GRACE_CHECKS
     lattice_routes: LatticeRoutes = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -226,14 +226,14 @@ class Search:
         self.archive = Archive(np.empty((0, self.encoding.lower.size)), no_scores())
 
     def score(self, vectors: Floats) -> Floats:
-        """Return the scores (n, 8) of vectors (n, d); the archive and the budget are not changed."""
+        """Return the scores (n, 8) of vectors (n, d); the archive and the budget stay unchanged."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
         data = self.problem.search
         if self.algorithm.graded:
             return score_table(*graded_scores(data, paths))
         counts, objectives = paper_scores(data, paths)
         if is_limited(data.airspace):
-            counts[:, Violation.BOUNDS] += airspace_counts(data, paths)
+            counts[:, Violation.BOUNDS] += count_airspace_violations(data, paths)
         return score_table(counts, objectives)
 
     def evaluate(self, vectors: Floats) -> Floats:
@@ -241,7 +241,7 @@ class Search:
 
         Raises SearchEnded if the search is asked to stop.
         """
-        batch_size, scores = max(1, WAYPOINTS_PER_PAUSE // self.encoding.waypoints), no_scores()
+        batch_size, scores = max(1, WAYPOINTS_PER_CHECK // self.encoding.waypoints), no_scores()
         for batch_start in range(0, len(vectors), batch_size):
             scores = np.concatenate([scores, self.score(vectors[batch_start : batch_start + batch_size])])
             if len(scores) < len(vectors) and self.should_stop():
@@ -258,11 +258,11 @@ class Search:
             raise SearchEnded
         return scores
 
-    def pause(self) -> None:
-        """Raise SearchEnded if the search is asked to stop.
+    def check_stop(self) -> None:
+        """Raise SearchEnded if the search has been asked to stop.
 
-        A search without a result continues for a few more pauses to find its first route. If it finds none, its result
-        is the straight line.
+        A search without a result may continue for the next few calls to find its first route. If it finds none, the
+        straight line becomes its result.
         """
         if not self.should_stop():
             return
@@ -296,9 +296,9 @@ class Search:
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search; insert the result in the archive; return its scores (8,).
 
-        If the budget allows less than two evaluations, the vector is only evaluated.
-
         max_evaluations: maximum number of evaluations.
+
+        If the budget allows less than two evaluations, the vector is only evaluated.
         """
         evaluation_limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
         if evaluation_limit < 2:
@@ -333,12 +333,12 @@ class Search:
         return self.algorithm.final_shortening and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
-        """Shorten a path (w, 3); keep the result, and return True, if it is the shortest finished path.
+        """Shorten a path (w, 3); keep the result and return True if it is the shortest finished path.
 
-        A finished path is certified and has the required distance from missiles. A shortened path that is not is
-        shortened again with larger margins: first with margins to spheres and ground, then with corners as flown, last
-        with margins of slopes. Shortening is given up as soon as the result is longer than the best path, lies too far
-        inside a missile's margin, or the budget is used up.
+        A path is finished if it is certified and has the required distance from missiles. A shortened path that is not
+        finished is shortened again with larger margins: first with margins to spheres and ground, then with corners as
+        flown, last with margins of slopes. Shortening is given up as soon as the result is longer than the best path,
+        lies too far inside a missile's margin, or the budget is used up.
         """
         data = self.problem.search
         # Additional margin, m; True to model the corners as flown; additional margin of slopes, rad.
@@ -364,7 +364,7 @@ class Search:
             # Keep the same problem if possible: a new one must be laid out in memory for kernels again.
             stricter_data = data._replace(angle_margin=data.angle_margin + slope_margin) if slope_margin > 0.0 else data
             path, evaluations = shorten_path(
-                stricter_data, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
+                stricter_data, path, extra_margin=extra_margin, corners_too=corners_too, check_stop=self.check_stop
             )
             self.evaluations += evaluations
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
@@ -389,7 +389,7 @@ class Search:
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 break
-            path, evaluations = shorten_path(problem.search, resample(path, len(path)), pause=self.pause)
+            path, evaluations = shorten_path(problem.search, resample(path, len(path)), check_stop=self.check_stop)
             self.evaluations += evaluations
             if path_length(path) < max_length and self.keep_if_finished(path, certify(self.problem, path)):
                 return True
@@ -417,7 +417,7 @@ class Search:
         return bool(are_safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
-        """Return True if the search is to end with the first safe path, and has found a path that meets the goal."""
+        """Return True if the search ends with the first safe path and has found one."""
         if not self.first_safe or (self.shortest is None and not self.archive.is_feasible()):
             return False
         return self.shortest is not None or self.meets_goal(self.best_certified()[1])
@@ -433,7 +433,7 @@ class Search:
     def length_ratio(self) -> float:
         """Return the length of the best path, divided by the straight distance.
 
-        It is the shorter of the archive's best path, if that is safe, and the shortest finished path.
+        The best path is the shorter of two: the archive's best path, if it is safe, and the shortest finished path.
         """
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
@@ -442,7 +442,7 @@ class Search:
         return min(ratio, shortened_ratio) if self.best_is_safe() else shortened_ratio
 
     def meets_goal(self, certificate: Certificate) -> bool:
-        """Return True if a path is certified and has the required distance from missiles, the goal of the search."""
+        """Return True if a path meets the goal: it is certified, at the required distance from missiles."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _evaluation_budget(self) -> float:
@@ -486,15 +486,15 @@ class Search:
             self.progress(self.done, self.done, f"{ratio:.4f} times the straight line, kill exposure 0")
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """Return the first path in the archive that is certified with the full kill margin, and its certificate.
+        """Return the best path in the archive that is certified with the full kill margin, and its certificate.
 
-        Without such a path, return the certified path furthest from missiles, or the first path if none is certified. A
-        search that is asked to end examines only the first few paths.
+        Without such a path, return the certified path furthest from missiles, or the best path if none is certified. A
+        search that is asked to stop examines only the first few paths.
         """
         first_path: tuple[Floats, Certificate] | None = None
         furthest_path: tuple[Floats, Certificate] | None = None
         for index, vector in enumerate(self.archive.vectors):
-            if index >= CERTIFICATES_PER_PAUSE and self.should_stop():
+            if index >= CERTIFICATES_PER_CHECK and self.should_stop():
                 break
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
             # The certificate is the same in all attempts.
@@ -520,8 +520,8 @@ class Search:
     def best_path(self) -> tuple[Floats, Certificate]:
         """Return the better of the archive's best path and the shortened path, and its certificate.
 
-        The shortened path is better if it is shorter, or if only it meets the goal. If neither path meets the goal, the
-        path further from missiles is better.
+        The shortened path is better if it is shorter, or if only it meets the goal. If neither path meets the goal, a
+        certified path is better, and of two certified paths the one further from missiles.
         """
         path, certificate = self.best_certified()
         if self.shortest is None and self.furthest_shortened is not None and not self.meets_goal(certificate):

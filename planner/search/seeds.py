@@ -1,8 +1,9 @@
 """Find starting points of a seeded search: the straight line, grid routes, other sides, and routes that turn back.
 
-Grid routes are fitted with waypoints and improved one after another; the best becomes the seed of the population. A
-grid estimates the shorter side of an obstacle only as well as it resolves gaps. Grids with reduced obstacles therefore
-propose one route for each choice of sides, and shortening decides which are safe and short.
+Waypoints are fitted to one grid route after another, and the paths are improved; the best becomes the seed of the
+population. A grid estimates the length of a route past an obstacle only as well as it resolves gaps. Grids with reduced
+obstacles therefore propose one route for each choice of sides, and shortening decides which are safe and short.
+
 A path in the straight frame cannot turn back. If it contains no safe path, or only a long one, a lattice search finds a
 route that may turn back or circle to climb; paths in a frame along this route are fitted and improved in the same way.
 """
@@ -85,15 +86,16 @@ def try_straight_line(search: Search) -> bool:
 def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
     """Return the vectors from which a search starts, (n, d): one seed and the previous path, if any.
 
-    The seed is made of a route over a grid; its waypoints are fitted to the route. Encodings other than "rotated" have
-    none, nor have algorithms that are not seeded, unless there is a previous path; the result then has no rows.
-
     grids: number of stages and number of routes of each grid.
     previous: older path (w, 3), or None.
 
-    Only one seed is used, the one with the best result after improvement, because a distribution
-    that is fitted to several routes describes none of them. The seed is used in its form before the improvement:
-    afterwards it is so close to every limit that hardly any sample around it is feasible.
+    Seeds are the archive's best path and paths that are fitted to routes over the grids. Only the seed with the best
+    result after improvement is used, because a distribution that is fitted to several routes describes none of them.
+    The seed is returned in its form before the improvement: afterwards it is so close to every limit that hardly any
+    sample around it is feasible.
+
+    There are no vectors for an encoding other than "rotated", nor for an algorithm that is not seeded and has no
+    previous path.
     """
     encoding, space, waypoint_count = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
@@ -122,12 +124,13 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
 
 
 def _list_routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRoute]:
-    """Return the routes over the grids, best first: in the order of paths that are quickly fitted to them.
+    """Return the routes over the grids, best first.
 
     grids: as in `starting_vectors`.
 
-    Each fitted path is inserted into the archive at once. As soon as a path is safe, and if routes may be shortened,
-    the following routes are only shortened and are not returned.
+    The order is by the scores of paths that are quickly fitted to the routes; each of these paths is inserted into the
+    archive at once. As soon as a path is safe, and if routes may be shortened, the following routes are only shortened
+    and are not returned.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -138,9 +141,9 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[Gri
     should_shorten = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
-        airspace_routes(data, frame, span, grids, search.pause)
+        airspace_routes(data, frame, span, grids, search.check_stop)
         if is_among_zones
-        else grid_routes(data, frame, span, grids, search.pause)
+        else grid_routes(data, frame, span, grids, search.check_stop)
     )
     for route in routes:
         if should_shorten and search.has_safe():
@@ -220,7 +223,7 @@ def search_other_sides(search: Search) -> None:
             if search.must_end():
                 break
             data = _close_narrow_places(search, step, step + depth)
-            route = ceiling_route(data, frame, step, depth, search.pause)
+            route = ceiling_route(data, frame, step, depth, search.check_stop)
             if not len(route):
                 continue
             path = resample(route, search.encoding.waypoints)
@@ -244,7 +247,7 @@ def search_other_sides(search: Search) -> None:
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes past other sides of obstacles that grids propose; return the routes (w, 3).
+    """Shorten the routes that grids propose past other sides of obstacles; return the routes (w, 3).
 
     grids: as in `GRIDS`: number of stages, reduction of the spheres, and spacing across as a fraction of a step.
 
@@ -258,7 +261,7 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
         step = frame.length / grid.stages
         closed_data = _close_narrow_places(search, step, (1.0 + shrink) * step - data.kill_margin)
-        for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.pause):
+        for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.check_stop):
             if route.cost > _max_route_cost(search):
                 break
             if search.must_end():
@@ -278,12 +281,12 @@ def _max_route_cost(search: Search) -> float:
 
 
 def _close_narrow_places(search: Search, step: float, kill_radius: float) -> ProblemArrays:
-    """Return the data of a search with a sphere at each narrow place, which closes it to routes of a grid.
-
-    Narrow places are those where a shortened path has come too close to a missile.
+    """Return the data of a search with a sphere at each narrow place, which keeps grid routes out of it.
 
     step: step of the grid or lattice, m; a place within a step of a closed place is not closed again.
     kill_radius: radius of the sphere that closes a place, m. It is large enough that no route steps over the sphere.
+
+    Narrow places are those where a shortened path has come too close to a missile.
     """
     data, places = search.problem.search, list[Floats]()
     for place in search.narrow_places:
@@ -332,7 +335,10 @@ FOLLOWED_MARGINS_M = (2.0, 5.0, 2.0)
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
     """Return True if a path that turns back may be better than the best path along the straight line.
 
-    This is the case if that path is not safe, or if it is long.
+    certificate: certificate of the best path along the straight line.
+
+    This may be the case if that path is not safe or is long. It is not tried with too few waypoints, with an algorithm
+    without seeds, with an encoding other than "rotated", or if the search must end.
     """
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
@@ -346,11 +352,11 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Search for a path along a route that may turn back; return the better of it and `best`.
 
-    The route is found on a lattice of places and courses. If this finds no safe path, a second search on the lattice
-    follows. It has a better estimate of the remaining length, and if the usual buffer above the ground is high, a lower
-    one.
-
     best: best path so far, with its certificate.
+
+    The route is found on a lattice of places and courses. If no path along it is safe, a second search on the lattice
+    follows, with a better estimate of the remaining length, and with a lower buffer above the ground if the usual
+    buffer is high.
     """
     best, is_complete = _search_lattices(search, best, is_guided=False)
     usual_problem, has_high_buffer = search.problem, search.problem.search.buffer > LOW_BUFFER_M
@@ -390,7 +396,7 @@ def _search_lattices(
         try:
             if key not in search.lattice_routes:
                 search.lattice_routes[key] = lattice_route(
-                    data, frame, step_fraction * step, search.pause, remaining_states, is_guided=is_guided
+                    data, frame, step_fraction * step, search.check_stop, remaining_states, is_guided=is_guided
                 )
         except SearchEnded:
             break
@@ -405,7 +411,7 @@ def _search_lattices(
         path, certificate, is_shortened = _search_along_route(search, route)
         if not search.meets_goal(certificate):
             # The route itself may be safe, with its points as waypoints.
-            route_path = with_waypoints(route, search.encoding.waypoints)
+            route_path = halve_longest_legs(route, search.encoding.waypoints)
             route_certificate = certify(search.problem, route_path)
             if search.meets_goal(route_certificate):
                 path, certificate = route_path, route_certificate
@@ -420,8 +426,8 @@ def _search_lattices(
     return best, remaining_states > 0
 
 
-def with_waypoints(path: Floats, count: int) -> Floats:
-    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
+def halve_longest_legs(path: Floats, count: int) -> Floats:
+    """Halve the longest leg of a path (w, 3) repeatedly until it has `count` waypoints; return the path."""
     waypoints = [np.asarray(point, dtype=np.float64) for point in path]
     while len(waypoints) < count:
         longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
@@ -432,8 +438,8 @@ def with_waypoints(path: Floats, count: int) -> Floats:
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Shorten the best path, safe or not, and search for a safe path along the result.
 
-    This is done with several margins in turn. Returns the best path found if it is safe and shorter than `best`;
-    otherwise returns `best`. Each path has its certificate.
+    This is done with several margins in turn. Returns the best safe path found if it is shorter than `best`, otherwise
+    `best`, each with its certificate.
     """
     if not search.can_shorten:
         return best
@@ -450,10 +456,10 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
 
 
 def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
-    """Search for a path along a route (k, 3), with one waypoint on each piece of it.
+    """Search for a path along a route (k, 3), with one waypoint on each piece of the route.
 
-    Waypoints are fitted to the route, improved and shortened in a search of its own, with frames along the route.
-    Returns the best path, its certificate, and True if shortening found a finished path.
+    Waypoints are fitted to the route, improved and shortened in a separate search, with frames along the route. Returns
+    the best path, its certificate, and True if shortening found a finished path.
     """
     waypoints = search.encoding.waypoints
     piece_ends, _ = sample_route(route, waypoints - 1)

@@ -12,10 +12,10 @@ Search = Callable[[Scenario, Limits], Plan]
 
 
 class SharedBudget:
-    """Search that several calls share: for the same plan, each in another scenario or within other limits.
+    """Callable that runs searches for one plan and shares the scenario's evaluation budget between them.
 
-    Each search may use the evaluations of the scenario's budget that earlier searches have left. If fewer than one
-    population remain, no further search is run, and the last plan is returned.
+    The searches may differ in the scenario and in the limits. Each search may use the evaluations that earlier searches
+    have left. If fewer than one population remain, no further search is run, and the last plan is returned.
     """
 
     def __init__(self, search: Search) -> None:
@@ -49,7 +49,7 @@ class SharedBudget:
         return sum(plan.evaluations for plan in self._plans)
 
     def _record_plan(self, plan: Plan) -> Plan:
-        """Store a plan and return it; if all earlier searches completed, also store why its search ended."""
+        """Store a plan and return it; if all earlier searches completed, also store why the search for it ended."""
         self._plans.append(plan)
         if self._end_reason == "completed":
             self._end_reason = plan.ended

@@ -1,8 +1,8 @@
 """Find cheapest routes over grids among zones and below a maximum height above ground, in the rotated frame.
 
-Dynamic programming over forward steps as in `planner.seeding.grids`, with two differences. Where there is a maximum
-height above ground, the layers follow the terrain. And each step is tested against the zones itself, because an
-obstacle between two cells may be narrower than their spacing.
+Dynamic programming over forward steps as in `planner.seeding.grids`, with two differences. If there is a maximum height
+above ground, the layers follow the terrain. Each step as a whole is tested against the zones, because an obstacle
+between two cells may be narrower than their spacing.
 """
 
 import math
@@ -53,7 +53,7 @@ class AirspaceGrid(NamedTuple):
     layer_spacing: m.
     follows: True if the layers follow the ground: the first layer is at the lowest allowed altitude of each column.
     floor: altitude of the first layer if the layers do not follow the ground, m.
-    gentle: True if changes of course have a cost and slopes stay below the steepest.
+    gentle: True if changes of course have a cost and slopes stay below the steepest possible slopes.
     """
 
     stages: int
@@ -107,12 +107,12 @@ def _fill_column(
 def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
     """Return the range of altitudes at which zones block a step, m AMSL.
 
-    If several exclusions block it, the range reaches from the lowest floor to the highest ceiling. Outside an inclusion
-    all altitudes are closed.
-
     line: the step on the map.
     lateral: tracking error to add to the zones' margins, m.
     ground: altitude of the ground at the start of the step, m, from which a zone's heights above ground are measured.
+
+    If several exclusions block it, the range reaches from the lowest floor to the highest ceiling. If an inclusion
+    blocks it, all altitudes are closed.
     """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
@@ -139,13 +139,14 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
-    """Return the tangents of the steepest climb and dive for each direction in which a path may continue.
-
-    Returns (2 * MAX_SIDE + 1, 2): row `MAX_SIDE + k` is the step that goes one cell forward and k cells to the side.
+    """Return the tangents of the steepest climb and dive for steps of each direction.
 
     step: length of a cell, m.
     amsl: altitude of the slope limits, m.
     fraction: fraction of the limits that may be used.
+
+    Returns (2 * MAX_SIDE + 1, 2): row `MAX_SIDE + k` is for the step that goes one cell forward and k cells to the
+    side.
     """
     slopes, a, b = np.zeros((2 * MAX_SIDE + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
@@ -171,14 +172,14 @@ def _set_layer_costs(
 ) -> None:
     """Fill the cost per m of path in the cells of a stage; inf outside the range of allowed altitudes.
 
-    The cost increases towards the edges of a band of heights above ground, and inside kill spheres.
-
     columns: `COLUMN` records (across,) of the stage, with the range of allowed altitudes.
     obstacles: `OBSTACLE` records: kill spheres in the rotated frame.
     along: position of the stage, m.
     extra: (across,) additional cost per m.
     first_across, last_across: range of cells across, both included.
     cell_costs: (across, layers) array to fill.
+
+    The cost increases towards the edges of the band of allowed heights above ground, and inside kill spheres.
     """
     near_obstacles, horizontal2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(first_across, last_across + 1):
@@ -224,7 +225,7 @@ def _relax_airspace_stage(
 
     previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this stage.
     cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and this stage (updated).
-    cell_costs: (across, layers) cost per m of the steps to this stage. A change of course from the parent also costs.
+    cell_costs: (across, layers) cost per m of the steps to this stage; a change of course costs extra.
     previous_parents, parents: (across, layers) cells from which these routes come: across x layers + layer (updated).
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
@@ -272,12 +273,15 @@ def _relax_airspace_stage(
 
 
 class AirspaceSearch(NamedTuple):
-    """Search for the cheapest route over a grid, stage by stage; it can be continued after a pause.
+    """State of a search for the cheapest route over a grid, which is continued stage by stage.
 
-    obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
-    the parent of each cell, as across x layers. cost: (across, layers) costs of the routes to the cells of the last
-    stage reached. next_cost, cell_costs: scratch. centre_index: index across of both ends. stage: the last stage
-    reached.
+    obstacles: `OBSTACLE` records.
+    columns: `COLUMN` records (stages + 1, across).
+    cells: (stages + 1, across, layers), the parent of each cell, as across x layers + layer.
+    cost: (across, layers) costs of the routes to the cells of the last stage reached.
+    next_cost, cell_costs: working memory.
+    centre_index: index across of both ends.
+    stage: the last stage reached.
     """
 
     obstacles: Records
@@ -290,8 +294,8 @@ class AirspaceSearch(NamedTuple):
     stage: int
 
 
-# Number of cells reached between two calls of `pause`: some 20 ms at most.
-CELLS_PER_PAUSE = 100_000
+# Number of cells reached between two calls of `check_stop`: some 20 ms at most.
+CELLS_PER_CHECK = 100_000
 
 
 def cheapest_airspace_route(
@@ -300,30 +304,28 @@ def cheapest_airspace_route(
     grid: AirspaceGrid,
     extra: Floats,
     bound: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, float]:
     """Find the cheapest route over a grid; return its points and its cost.
 
-    The points are along, across and up, (stages + 1, 3).
-
     extra: (stages + 1, across) additional cost per m.
     bound: upper limit on the cost of the route; dearer routes are not found.
-    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    check_stop: called after every `CELLS_PER_CHECK` cells; an exception raised there stops the search.
 
-    Without a route, the points are (0, 3) and the cost is inf.
+    The points are along, across and up, (stages + 1, 3) m. Without a route, they are (0, 3) and the cost is inf.
     """
-    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers))
+    stages = max(1, CELLS_PER_CHECK // (grid.across.size * grid.layers))
     search: AirspaceSearch = begin_airspace_route(data, frame, grid)
     while search.stage < grid.stages:
         search = continue_airspace_route(data, frame, grid, extra, bound, search, stages)
-        pause()
+        check_stop()
     points, cost = end_airspace_route(data, frame, grid, search)
     return points, cost
 
 
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
-    """Return a new search for the cheapest route, before its first stage: only the start has a cost, 0."""
+    """Make a search for the cheapest route, before its first stage, with the cost 0 at the start."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     centre_index = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, width), dtype=COLUMN)
@@ -353,7 +355,7 @@ def continue_airspace_route(
     search: AirspaceSearch,
     max_stages: int,
 ) -> AirspaceSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return its state.
 
     extra: (stages + 1, across) additional cost per m of path in each position.
     bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
@@ -409,7 +411,7 @@ def end_airspace_route(
     grid: grid that was searched.
     search: the search after its last stage.
 
-    The points are along, across and up, (stages + 1, 3) m. Without a route, the points are (0, 3) and the cost is inf.
+    The points are along, across and up, (stages + 1, 3) m. Without a route, they are (0, 3) and the cost is inf.
     """
     stages = grid.stages
     step = frame.length / grid.stages
@@ -433,7 +435,10 @@ def end_airspace_route(
 
 @inner
 def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
-    """Return the index of the layer that is nearest to a height (m) in a `COLUMN` record."""
+    """Return the index of the layer nearest to an altitude in a `COLUMN` record.
+
+    height: the altitude, m AMSL.
+    """
     first_height = column.lowest if grid.follows else grid.floor
     return min(grid.layers - 1, max(0, round((height - first_height) / grid.layer_spacing)))
 
@@ -491,22 +496,22 @@ def airspace_routes(
     frame: RotatedFrame,
     span: tuple[float, float],
     grids: tuple[tuple[int, int], ...],
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Yield routes over grids, for a problem with zones or a maximum height.
 
     span: lowest and highest position across, m.
     grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
 
-    Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. Before that, the first grid is
-    searched without this restriction, because narrow gaps may require steep or curved routes.
+    Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. The first grid is searched without
+    this restriction before that, because narrow gaps may require steep or curved routes.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for index, (stages, route_count) in enumerate(grids):
         grid = airspace_grid(data, frame, span, STAGE_FACTOR * stages)
         if index == 0:
-            route = _find_route(data, frame, grid._replace(gentle=False), (), expected_cost, pause)
+            route = _find_route(data, frame, grid._replace(gentle=False), (), expected_cost, check_stop)
             if route is not None:
                 yield route
         earlier_routes: tuple[GridRoute, ...] = ()
@@ -517,7 +522,7 @@ def airspace_routes(
                 grid,
                 earlier_routes,
                 math.inf if earlier_routes else FINER_COST_RATIO * expected_cost,
-                pause,
+                check_stop,
             )
             if route is None:
                 break
@@ -532,17 +537,17 @@ def _find_route(
     grid: AirspaceGrid,
     earlier_routes: tuple[GridRoute, ...],
     expected_cost: float,
-    pause: Callable[[], None],
+    check_stop: Callable[[], None],
 ) -> GridRoute | None:
     """Return the cheapest route over a grid that keeps away from earlier routes; None without one.
 
     earlier_routes: routes near which a path costs more.
     expected_cost: upper limit on the cost with which the search is tried first; the second search has no limit.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
     """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):
-        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)
+        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, check_stop)
         if len(points):
             return GridRoute(points, float(cost))
         if bound == math.inf:

@@ -21,10 +21,10 @@ MAX_SPREAD_FRACTION = 0.3
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
     """Return smooth shapes for displacements of a path's inner waypoints, and how strongly each varies.
 
-    They are the eigenvectors of the kernel min(s, t) - s t of a Brownian bridge, which is fixed at both ends. The
-    inverse of the kernel is the second difference, so the eigenvectors are sines: half a wave, a whole wave, and so on.
-
     inner: number n of inner waypoints.
+
+    The shapes are the eigenvectors of the kernel min(s, t) - s t of a Brownian bridge, which is fixed at both ends. The
+    inverse of the kernel is the second difference, so the eigenvectors are sines: half a wave, a whole wave, and so on.
 
     Returns the eigenvectors as columns, (n, n), and their standard deviations relative to the first, (n,).
     """
@@ -50,11 +50,11 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(space: Space, encoding: Encoding, count: int, starts: Floats, rng: np.random.Generator) -> Floats:
     """Draw the first samples (count, d) of a search: the start vectors, and smooth paths around them.
 
-    A sample holds three values for each inner waypoint: the positions along and across the direct line, and the
-    altitude. Smooth random displacements move it across and up.
-
     starts: vectors (s, d) to start from; without starts, the smooth paths are drawn around the straight line, raised by
         a random part of the space below the ceiling.
+
+    A sample consists of three values for each inner waypoint: its positions along and across the direct line, and its
+    altitude. Smooth random displacements move the waypoints across and up.
     """
     inner_count = encoding.waypoints - 2
     modes, deviations = bridge_modes(inner_count)

@@ -1,9 +1,10 @@
 """Constrain the heights and slopes of flown corners in shortening, with derivatives by the waypoints.
 
-Around the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
-error the flight is on the chords of fly-by arcs; with tracking error it is within a distance of the legs before and
-after the waypoint, on both sides.  A certificate measures all of these positions; shortening measures samples of them.
-An arc is shorter than the legs it replaces, and steeper, so a path that climbs in circles must climb less on its arcs.
+Around the end of a ridge a flight that cuts its corners passes over higher ground than the ground below the legs.
+Without tracking error the flight is on the chords of fly-by arcs; with tracking error it is within a distance of the
+legs before and after the waypoint, on both sides. A certificate measures all of these positions; shortening measures
+samples of them. An arc is shorter than the legs it replaces, and steeper, so a path that climbs in circles must climb
+less on its arcs.
 """
 
 import math
@@ -48,11 +49,11 @@ class FlownCorners(NamedTuple):
     """Corners of a path of w waypoints that are flown near the ground or almost as steeply as possible.
 
     radii: (w,) radii of the turns near the ground, m; 0 for other corners.
-    lowered: (w, 2) required height in addition to the clearance, because the flight is below the legs before and after
-    the corner, m.
+    lowered: (w, 2) height required in addition to the clearance, m, because the flight is below the legs before and
+        after the corner.
     steep_radii: (w,) radii of the arcs that are almost as steep as can be flown, m; 0 for other arcs.
     slopes: (w, 2) tangents of the steepest climb and dive there.
-    slope_margin: length that an arc has in addition to what its climb or descent needs, m.
+    slope_margin: spare length that an arc must have beyond what its climb or descent needs, m.
     """
 
     radii: Floats
@@ -81,12 +82,12 @@ def corners_near_ground(
 ) -> FlownCorners:
     """Find a path's corners that are flown close to the ground, or almost as steeply as allowed.
 
-    A corner near the ground is one of whose samples any is less than `NEAR_GROUND_HEIGHT_M` above the required height.
-    Corners that hardly leave the legs are omitted. Fly-over waypoints have no such corners.
-
     path: (w, 3) m.
     corners, lags: `CORNER` records of the turns, and `HEIGHT_LAG` records of the legs.
     margin: height added to the required clearance, m.
+
+    A corner is near the ground if any of its samples is less than `NEAR_GROUND_HEIGHT_M` above the required height.
+    Corners that hardly leave the legs are omitted. A path of fly-over waypoints has no such corners.
     """
     count = path.shape[0]
     flown, point = no_corners(count, margin), np.empty(3)
@@ -167,7 +168,7 @@ def spare_arc_length(
     sign: 1 for a climb, -1 for a descent.
     max_slope: tangent of the maximum slope.
 
-    Slopes are those of `aircraft.path_limits.arc_slope`.
+    The slope of the arc is defined as in `aircraft.path_limits.arc_slope`.
     """
     length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux = waypoint[0] - previous[0]
@@ -185,7 +186,7 @@ def spare_arc_length(
 
 @inner
 def leg_index(sample: int) -> int:
-    """Return 0 if a sample of a corner is on the leg before the corner, 1 if it is on the leg after it."""
+    """Return 0 for a sample of a corner on the leg before the corner, 1 for one on the leg after it."""
     return 2 * sample // SAMPLES_PER_CORNER
 
 
@@ -213,14 +214,14 @@ def corner_point(
     sample: int,
     out: Floats,
 ) -> None:
-    """Compute the position of a sample of the flown corner at `waypoint`, and fill `out` (3,) with it.
+    """Fill `out` (3,) with the position of a sample of the flown corner at `waypoint`, m.
 
     previous_waypoint, waypoint, next_waypoint: (3,) m.
     radius: radius of the turn, m.
     sample: number of the sample, from 0 to `SAMPLES_PER_CORNER` - 1.
-    out: (3,) m.
 
-    A sample has the height of the leg, or of the arc between its tangent points.
+    With tracking error the samples are on both sides of the two legs, at the altitudes of the legs. Without it they are
+    on the arc, whose altitude changes linearly between its tangent points.
     """
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in
@@ -262,15 +263,15 @@ def corner_derivatives(
 ) -> None:
     """Fill `slopes` with the derivatives of a value at a corner's sample by the corner's three waypoints.
 
-    A waypoint that moves also moves the sample, which changes the value (chain rule). The motion of the sample is
-    computed by central differences with the step `CORNER_STEP_M`.
-
     corner: (3, 3) the waypoints, m; changed during the computation, and restored.
     radius: radius of the arc, m.
     sample: number of the sample, as in `corner_point`.
     gradient: (3,) derivatives of the value with respect to the position of the sample.
     point: working memory, (3,).
     slopes: (3, 3) array to fill: row i is for waypoint i.
+
+    A waypoint that moves also moves the sample, which changes the value (chain rule). The motion of the sample is
+    computed by central differences with the step `CORNER_STEP_M`.
     """
     for row in range(3):
         for axis in range(3):

@@ -3,6 +3,7 @@
 A grid decides on which side to pass each obstacle; `planner.seeding.waypoint_fitting` then places the path's waypoints,
 one per interval, by evaluating whole legs. Both use dynamic programming over forward steps, because a path in the
 rotated encoding never turns back.
+
 Cells cost more near the ground and inside kill spheres (`set_cell_costs`). `cheapest_route` relaxes one stage after
 another and prunes every cell through which no route stays within a cost bound; a route found within the bound is
 optimal. `grid_routes` repeats this with a penalty near earlier routes, to find routes on other sides.
@@ -49,8 +50,8 @@ class Grid(NamedTuple):
     stages: number of stages, which are equal steps along the line from start to destination.
     across: (across,) positions across, m from the line.
     layers: (layers,) altitudes, m.
-    shrink: fraction of a step by which kill spheres are reduced; 0 for none. Routes on such a grid may have to be
-        shortened to be safe, but pass gaps between its cells.
+    shrink: fraction of a step by which kill spheres are reduced; 0 for none. Routes on such a grid pass gaps narrower
+        than its cells, but may have to be shortened to be safe.
     spread: fraction of a step around a cell over which the highest ground is taken.
     ratio: spacing across as a fraction of a step; below 1 the grid has more courses and resolves finer gaps.
     """
@@ -90,13 +91,14 @@ def _min_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:
-    """Return the lowest allowed altitude in a cell, m: the highest of some ground samples plus the clearance.
+    """Return the lowest allowed altitude in a cell, m; inf outside the map or without terrain data.
 
     required: required clearance.
     along, across: position of the cell in the rotated frame, m.
-    steps: steps between the 3 x 3 samples around the position; if they are 0, only its own ground is taken.
+    steps: steps between the 3 x 3 ground samples around the position; if they are 0, only the ground at the position is
+        taken.
 
-    The result is inf outside the map or without data.
+    It is the highest of the ground samples plus the required clearance.
     """
     east, north = to_world_position(frame, along, across)
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -138,7 +140,7 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
     """Convert the missiles to `OBSTACLE` records for a grid, with radii that suit the grid.
 
     step: length of a stage, m. Spheres are enlarged on coarse grids, to cover the space between the cells.
-    shrink: fraction of a step by which kill spheres are reduced instead; 0 for none.
+    shrink: if it is not 0, spheres are reduced by this fraction of a step instead.
     """
     growth = COARSE_GROWTH_STEPS * step if step > COARSE_STEP_M else 0.0
     if shrink > 0.0:
@@ -204,7 +206,7 @@ def set_cell_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill the costs per m of cells of a stage.
+    """Fill the cost per m of path in the cells of a stage.
 
     required: required clearance.
     stage: number of the stage.
@@ -286,10 +288,7 @@ def relax_cells(
     count: int,
     length: float,
 ) -> None:
-    """Extend the routes of successive cells to cells of the next stage; keep the cheaper route of each cell.
-
-    Cell first_source + k is extended to cell first_target + k, for k from 0 to count - 1. All arrays are flat: layer
-    after layer, and in each layer the cells across.
+    """Extend the routes of successive cells to the next stage; keep the cheaper route to each cell.
 
     cost, next_cost: costs of the routes to the cells of this stage and of the next stage; `next_cost` is updated.
     cell_costs: cost per m of the cells.
@@ -297,6 +296,9 @@ def relax_cells(
     first_source, first_target, first_cell_cost: indices of the first cells, and of the first cell cost.
     count: number of the cells.
     length: length of each step, m.
+
+    Cell first_source + k is extended to cell first_target + k, for k from 0 to count - 1. All arrays are flat: layer
+    after layer, and in each layer the cells across.
     """
     for k in range(count):
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
@@ -322,8 +324,9 @@ def relax_stage(
 ) -> None:
     """Extend all routes by one step to the next stage; keep the cheapest route to each of its cells.
 
-    cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage.
-    parents: (layers, across) cells of the previous stage from which the cheapest routes come.
+    cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage; the
+        latter are updated.
+    parents: (layers, across) cells of the previous stage from which the cheapest routes come; updated.
     spans: `SPAN` records (layers,) of the cells with a finite cost in the previous stage.
     step_layers: steepest climb and descent from the previous stage, as `layers_per_step` returns them.
     cell_costs: (layers, across) cost per m of the steps to the cells of this stage.
@@ -428,7 +431,7 @@ def prune_cells(
 
 
 class GridSearch(NamedTuple):
-    """Search for the cheapest route over a grid, stage by stage; it can be continued after a pause.
+    """State of a search for the cheapest route over a grid, which is continued stage by stage.
 
     step_layers: steepest climb and descent of a step, as `layers_per_step` returns them.
     obstacles: `OBSTACLE` records.
@@ -454,8 +457,8 @@ class GridSearch(NamedTuple):
     stage: int
 
 
-# Number of cells reached between two calls of `pause`: some 10 ms.
-CELLS_PER_PAUSE = 150_000
+# Number of cells reached between two calls of `check_stop`: some 10 ms.
+CELLS_PER_CHECK = 150_000
 
 
 def cheapest_route(
@@ -464,28 +467,28 @@ def cheapest_route(
     grid: Grid,
     extra: Floats,
     bound: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> tuple[Records, float]:
     """Find the cheapest route over a grid; return its `ROUTE_CELL` records (stages + 1,) and its cost.
 
     extra: (stages + 1, across) additional cost per m.
     bound: upper limit on the cost; more expensive routes are not searched.
-    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    check_stop: called after every `CELLS_PER_CHECK` cells; an exception raised there stops the search.
 
     Without a route, there are no records and the cost is inf.
     """
-    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
+    stages = max(1, CELLS_PER_CHECK // (grid.across.size * grid.layers.size))
     search: GridSearch = begin_route(data, frame, grid)
     while search.stage < grid.stages:
         search = continue_route(data, frame, grid, extra, bound, search, stages)
-        pause()
+        check_stop()
     cells, cost = extract_route(search)
     return cells, cost
 
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
-    """Return a new search for the cheapest route, before its first stage: only the start has a cost, 0."""
+    """Make a search for the cheapest route, before its first stage, with the cost 0 at the start."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     centre_index, start_layer = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
@@ -520,10 +523,11 @@ def continue_route(
     search: GridSearch,
     max_stages: int,
 ) -> GridSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue; return it.
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return its state.
 
-    extra: (stages + 1, across) additional cost per m of path in each position. search: its arrays are overwritten.
+    extra: (stages + 1, across) additional cost per m of path in each position.
     bound: upper limit on the cost of the route; cells that only dearer routes can use are dropped.
+    search: state of the search; its arrays are overwritten.
     """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -641,7 +645,7 @@ def positions_across(span: tuple[float, float], spacing: float, stages: int) -> 
     stages: number of stages of the grid.
 
     A route begins and ends at the position 0 and moves by at most `MAX_SIDE` cells per stage. With few stages it can
-    therefore reach only a small part of the map.
+    therefore reach only positions near the line.
     """
     reach = MAX_SIDE * (stages // 2)
     first, last = max(-reach, math.ceil(span[0] / spacing)), min(reach, math.floor(span[1] / spacing))
@@ -652,7 +656,7 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
     """Make a grid with square cells on the map, and with one layer at the altitude of the start.
 
     span: lowest and highest position across, m.
-    stages: number of stages; fewer if the grid would be too large.
+    stages: number of stages; fewer if the grid would have more than `MAX_CELLS` cells.
     """
     min_altitude, max_altitude = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level_point = np.array([*data.destination[:2], data.start[2]])
@@ -681,21 +685,21 @@ def grid_route(
     grid: Grid,
     earlier_routes: tuple[GridRoute, ...] = (),
     expected_cost: float = math.inf,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
     """Return the cheapest route over a grid; None if terrain and ceiling block every route.
 
-    earlier_routes: earlier routes; the cost is higher near them, so that the next route takes another side.
+    earlier_routes: routes near which a path costs more, so that the next route takes another side.
     expected_cost: upper limit on the cost with which the search is tried first, such as the cost on a coarser grid. If
-        it fails, a search without a limit follows.
-    pause: called from time to time; an exception raised there stops the search.
+        no route is found, a search without a limit follows.
+    check_stop: called from time to time; an exception raised there stops the search.
     """
     if grid.layers.size == 0:
         return None
     along = np.linspace(0.0, frame.length, grid.stages + 1)
     extra = proximity_cost(along, grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):
-        cells, cost = cheapest_route(data, frame, grid, extra, bound, pause)
+        cells, cost = cheapest_route(data, frame, grid, extra, bound, check_stop)
         if cells.size:
             points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
             return GridRoute(points, float(cost))
@@ -725,14 +729,14 @@ def grid_routes(
     frame: RotatedFrame,
     span: tuple[float, float],
     grids: tuple[tuple[int, int], ...],
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Yield the routes of each grid, cheapest first.
 
     frame: frame of the direct line.
-    span: smallest and largest offset of the cells across the line, m.
+    span: lowest and highest position across, m.
     grids: for each grid, its number of stages and its number of different routes.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:
@@ -740,7 +744,9 @@ def grid_routes(
         earlier_routes: tuple[GridRoute, ...] = ()
         for _ in range(route_count):
             # A second route costs more than the first.
-            route = grid_route(data, frame, grid, earlier_routes, math.inf if earlier_routes else expected_cost, pause)
+            route = grid_route(
+                data, frame, grid, earlier_routes, math.inf if earlier_routes else expected_cost, check_stop
+            )
             if route is None:
                 break
             if not earlier_routes:

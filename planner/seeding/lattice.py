@@ -1,10 +1,10 @@
 """Find routes that may turn back or circle to climb, by A* over a lattice of positions, heights and eight courses.
 
-A* search (Hart, Nilsson and Raphael, 1968) over states of a lattice point and one of eight courses. A step leads to a
-neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a route that
-needs more distance to climb than is available therefore circles. The heuristic is the straight distance to the goal, or
-in a guided search an estimate that knows obstacles and slopes. The resulting route is simplified by replacing steps
-with feasible straight legs (`simplify_route`).
+A* search (Hart, Nilsson and Raphael, 1968) over states; a state is a lattice point and one of eight courses. A step
+leads to a neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a
+route that needs more distance to climb than is available therefore circles. The heuristic is the straight distance to
+the goal, or in a guided search an estimate that knows obstacles and slopes. The resulting route is simplified by
+replacing steps with feasible straight legs (`simplify_route`).
 """
 
 import heapq
@@ -128,7 +128,7 @@ class _StateTable(NamedTuple):
         the start.
     is_expanded: True for a state whose successors have been reached.
     layer_limits: (8, 2) maximum climb and descent of a step on each course, in layers.
-    steps: whether a step is free, by cell, course and change of layer: `_UNKNOWN`, `_FREE` or `_CLOSED`.
+    steps: status of the steps by cell, course and change of layer: `_UNKNOWN`, `_FREE` or `_CLOSED`.
     heuristic: estimate of the remaining length.
     """
 
@@ -142,12 +142,13 @@ class _StateTable(NamedTuple):
 
 @inner
 def _remaining_cost(lattice: Lattice, heuristic: Heuristic, position: int, altitude: float) -> float:
-    """Return the estimated cost from a column of a lattice at an altitude to the goal, m.
-
-    It is the length of a slope to the goal that is long enough for the distance, and for the climb or descent.
+    """Estimate the cost from a column of a lattice at an altitude to the goal, m.
 
     position: index of the column in `heuristic.squared_distances`.
     altitude: m.
+
+    It is the length of a sloped line that covers both the distance and the length that the climb or descent needs,
+    times the heuristic's weight.
     """
     climb = lattice.low + lattice.goal_layer * lattice.layer_spacing - altitude
     slope_length = climb * heuristic.climb_length if climb > 0.0 else climb * heuristic.descent_length
@@ -168,16 +169,15 @@ def _expand_state(
 ) -> None:
     """Expand a state: add the successors that it reaches at a lower cost than before to the open list.
 
-    A successor is the next point on a course that differs by at most `max_turn`. Its layer is one that the aircraft can
-    climb or descend to. The step to it must be free of violations.
-
     lattice: points of the lattice; a state is a point, a layer and one of eight courses.
     table: costs, parents and flags of all states; updated.
     state: number of the state: (point x layers + layer) x 8 + course.
     max_turn: largest turn per step, in units of 45 degrees.
     open_states: heap of (priority, state), to which the successors are added.
 
-    The priority of a successor is its cost plus its remaining cost.
+    A successor is the next point on a course that differs by at most `max_turn`, in a layer that the aircraft can climb
+    or descend to; the step to it must be free of violations. The priority of a successor is its cost plus its remaining
+    cost.
     """
     layer_limits, course, cell = table.layer_limits, state % 8, state // 8
     layer, position = cell % lattice.layers, cell // lattice.layers
@@ -216,7 +216,7 @@ def _expand_state(
 
 
 class LatticeSearch(NamedTuple):
-    """A* search over a lattice that can be continued after a pause.
+    """State of an A* search over a lattice, which is continued a number of expansions at a time.
 
     table: costs, parents and flags of all states.
     costs, states: (k,) priorities and states of the open list, in heap order.
@@ -240,7 +240,7 @@ GUIDED_WEIGHT = 1.5
 
 @compiled
 def _straight_distances(frame: RotatedFrame, lattice: Lattice) -> Floats:
-    """Return the square of the straight distance from each column of a lattice to the goal, (along x across,) m2."""
+    """Return the squared straight distance from each column of a lattice to the goal, (along x across,) m2."""
     squared_distances, point, goal = np.empty(lattice.along * lattice.across), np.empty(3), np.empty(3)
     _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
     for position in range(squared_distances.size):
@@ -253,10 +253,9 @@ def _straight_distances(frame: RotatedFrame, lattice: Lattice) -> Floats:
 def _distances_around_obstacles(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Floats:
     """Return the length of the shortest path around obstacles from each column to the goal, m.
 
-    Dijkstra's algorithm (1959) over steps to the eight neighbours, on the map. A step that is free of violations in at
-    least one layer counts with its length, other steps with `CLOSED_LENGTH_FACTOR` times their length.
-
-    Returns (along x across,): one length for each column.
+    Dijkstra's algorithm (1959) over steps to the eight neighbours, on the map. The length of a step that is not free of
+    violations in any layer is multiplied by `CLOSED_LENGTH_FACTOR`. Returns (along x across,): one length for each
+    column.
     """
     limits = precompute_limits(data)
     distances, start, end = np.full(lattice.along * lattice.across, np.inf), np.empty(3), np.empty(3)
@@ -300,7 +299,7 @@ def _distances_around_obstacles(data: ProblemArrays, frame: RotatedFrame, lattic
 def begin_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, *, is_guided: bool = False
 ) -> LatticeSearch:
-    """Return a new search for a route from start to destination, before its first expansion.
+    """Make a search for a route from start to destination, before its first expansion.
 
     is_guided: True for an estimate of the remaining length that knows obstacles and slopes.
     """
@@ -331,11 +330,13 @@ def begin_lattice_search(
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states at the start as reached, on the prescribed course or on all; return them, (k,).
+    """Mark the states at the start as reached and return them, (k,).
 
     frame: frame of the direct line.
     lattice: points of the lattice; a state is a point, a layer and one of eight courses.
     table: costs and parents of all states, in which the states at the start get the cost 0.
+
+    There is a state for the prescribed course, or one for each of the eight courses if none is prescribed.
     """
     first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     start_course = _nearest_course(frame, data.start_course)
@@ -354,12 +355,12 @@ def continue_lattice_search(
     search: LatticeSearch,
     max_expansions: int,
 ) -> LatticeSearch:
-    """Continue a search by up to `max_expansions` expansions; return it.
+    """Continue a search by up to `max_expansions` expansions; return its state.
 
     max_turn: largest turn per step, in units of 45 degrees.
 
-    The search ends when the goal is reached on the prescribed course (`goal_state`), or in vain when the open list is
-    empty.
+    The search succeeds when the goal is reached on the prescribed course, which sets `goal_state`; it fails when the
+    open list is empty.
     """
     limits, table, expanded_count = precompute_limits(data), search.table, search.expanded_count
     goal_cell = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
@@ -463,8 +464,8 @@ SPACING_FACTOR = 1.1
 MAX_EXPANDED = 60_000
 # The same for guided searches. In 2,000 scenarios, those that led to a safe path expanded at most 2,100 states.
 MAX_GUIDED_EXPANDED = 20_000
-# States expanded between two calls of `pause`: some 10 ms.
-STATES_PER_PAUSE = 2000
+# States expanded between two calls of `check_stop`: some 10 ms.
+STATES_PER_CHECK = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
@@ -536,7 +537,7 @@ def cheapest_lattice_route(
     lattice: Lattice,
     max_turn: int,
     max_states: int,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
     *,
     is_guided: bool = False,
 ) -> tuple[Records, int]:
@@ -544,17 +545,18 @@ def cheapest_lattice_route(
 
     max_turn: largest turn per step, in units of 45 degrees.
     max_states: maximum number of expanded states.
+    check_stop: called after every `STATES_PER_CHECK` states; an exception raised there stops the search.
     is_guided: as in `begin_lattice_search`.
 
-    There are no records if no route is found with this number of states. A guided search may find a route that is not
-    the cheapest. The work is the number of expanded states.
+    The work is the number of expanded states. There are no records if no route is found within the maximum number. A
+    guided search may find a route that is not the cheapest.
     """
     search = begin_lattice_search(data, frame, lattice, is_guided=is_guided)
     while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
         search = continue_lattice_search(
-            data, frame, lattice, max_turn, search, min(STATES_PER_PAUSE, max_states - search.expanded_count)
+            data, frame, lattice, max_turn, search, min(STATES_PER_CHECK, max_states - search.expanded_count)
         )
-        pause()
+        check_stop()
     if search.goal_state < 0:
         return np.zeros(0, dtype=LATTICE_CELL), search.expanded_count
     return trace_route(search.table.parents, search.goal_state, lattice), search.expanded_count
@@ -564,7 +566,7 @@ def lattice_route(
     data: ProblemArrays,
     frame: RotatedFrame,
     step: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
     *,
     is_guided: bool = False,
@@ -572,7 +574,7 @@ def lattice_route(
     """Find a route over a lattice; return its points, (k, 3) m, and the number of expanded states.
 
     step: spacing of the lattice, m.
-    pause: called after every `STATES_PER_PAUSE` states; an exception raised there stops the search.
+    check_stop: called after every `STATES_PER_CHECK` states; an exception raised there stops the search.
     max_states: maximum number of expanded states.
     is_guided: as in `begin_lattice_search`.
 
@@ -582,7 +584,7 @@ def lattice_route(
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
     max_turn = 2 if data.max_turn >= math.radians(90.0) else 1
     cells, expanded_count = cheapest_lattice_route(
-        data, frame, lattice, max_turn, max_states, pause, is_guided=is_guided
+        data, frame, lattice, max_turn, max_states, check_stop, is_guided=is_guided
     )
     if not len(cells):
         return np.empty((0, 3)), expanded_count
@@ -594,13 +596,13 @@ def lattice_route(
 
 
 def ceiling_route(
-    data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, check_stop: Callable[[], None] = lambda: None
 ) -> Floats:
-    """Find a route at the altitude of the ceiling; return its world points, (k, 3) m; k is 0 for none.
+    """Find a route at the altitude of the ceiling; return its points, (k, 3) m; k is 0 if there is none.
 
     step: spacing of the lattice, m.
     depth: depth to which the route may enter the missiles' spheres, m.
-    pause: function called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
 
     The spheres of missiles on the ground are narrowest at the ceiling. Only one layer is searched, which takes
     milliseconds. The climb to the ceiling at the start and the descent at the destination may therefore be too steep.
@@ -610,4 +612,4 @@ def ceiling_route(
         # Read-only like a scenario's ends: for a writable array the kernels would be compiled again.
         end.setflags(write=False)
     level_data = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-depth)
-    return lattice_route(level_data, frame, step, pause)[0]
+    return lattice_route(level_data, frame, step, check_stop)[0]

@@ -2,7 +2,7 @@
 
 After Hooke and Jeeves ("Direct search", Journal of the ACM 8, 1961), over a basis of triangular displacements of
 several widths. Sampling finds the route around the obstacles; this local search finds the last percent of its length
-with fewer evaluations. It minimises the length ratio plus priced violations.
+with fewer evaluations. It minimises the merit of the path: its length ratio plus a price for its violations.
 """
 
 import math
@@ -50,17 +50,18 @@ MIN_SCALE = 0.002
 
 
 # Number of evaluations between two calls of `must_end`: some 20 ms at most.
-EVALUATIONS_PER_PAUSE = 150
+EVALUATIONS_PER_CHECK = 150
 
 
 class _State(NamedTuple):
     """State of a pattern search; vectors are (d,).
 
-    The merit of a path is its length ratio plus a price for its violations; lower is better. In a round every move is
-    tried once.
+    In a round every move is tried once. The merit of a path is its length ratio plus a price for its violations; lower
+    is better.
 
     best_vector, best_merit: vector with the lowest merit.
-    feasible_vector, feasible_merit: vector with the lowest merit among those without violations; inf if there is none.
+    feasible_vector, feasible_merit: vector with the lowest merit among those without violations; the merit is inf if
+        there is none.
     round_start: vector at the beginning of the round.
     steps: (k,) present size of each move, with its sign.
     move: next move of the round.
@@ -106,13 +107,13 @@ def search_patterns(
 ) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding; return vectors (k, d) and the number of evaluations.
 
-    Single waypoints and groups of neighbours are moved in turn, along one axis at a time. A move that lowers the merit
-    (the length ratio plus priced violations) is kept and becomes longer, otherwise it turns round and becomes shorter.
-
     vector: the path, (d,).
     evaluations: maximum number of evaluations.
-    must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; if it returns True, the search ends with its
+    must_end: called after every `EVALUATIONS_PER_CHECK` evaluations; if it returns True, the search ends with its
         present result.
+
+    Single waypoints and groups of neighbours are moved in turn, along one axis at a time. A move that lowers the merit
+    (the length ratio plus priced violations) is kept, and its step grows; otherwise its step shrinks and changes sign.
 
     The vectors are the best feasible vector, if there is one, and the vector with the lowest merit, if it is another
     one.
@@ -128,8 +129,8 @@ def search_patterns(
     box, initial_steps = _Box(encoding.lower, encoding.upper), steps.copy()
     state: _State = _begin_search(data, frames, start, steps)
     while not state.is_done:
-        pause_count = min(evaluations, state.evaluations + EVALUATIONS_PER_PAUSE)
-        state = _continue_search(data, frames, box, moves, initial_steps, state, pause_count, evaluations)
+        next_check = min(evaluations, state.evaluations + EVALUATIONS_PER_CHECK)
+        state = _continue_search(data, frames, box, moves, initial_steps, state, next_check, evaluations)
         if not state.is_done and must_end():
             break
     if state.feasible_merit <= state.best_merit:
@@ -199,15 +200,15 @@ def _evaluate_merit(
     best_merit: float,
     feasible_merit: float,
 ) -> tuple[float, bool]:
-    """Return the merit of a vector (length ratio plus priced violations), and True if its path is feasible.
+    """Return the merit of a vector (length ratio plus priced violations), and True if it is feasible.
 
     frames: origin and rotation of the frame in which each waypoint moves.
     vector: (3 n,) along, across and altitude of the n inner waypoints in their frames, m.
-    candidate: scratch; its path is overwritten with the waypoints, and its records with the scores.
+    candidate: working memory; its path is overwritten with the waypoints, and its records with the scores.
+    best_merit, feasible_merit: merits above which a vector is of no use, for any vector and for a feasible one.
 
     Each part of the evaluation only adds to the merit. Therefore the evaluation ends as soon as the merit reaches
-    `best_merit`. If the path is feasible so far, it must also reach `feasible_merit`. The returned merit is then a
-    lower bound.
+    `best_merit` and, if the path is feasible so far, also `feasible_merit`. The returned merit is then a lower bound.
     """
     path, waypoints, scratch = candidate.path, vector.reshape((vector.size // 3, 3)), candidate.scratch
     for i in range(waypoints.shape[0]):
@@ -254,7 +255,7 @@ def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, boo
 
 @compiled
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
-    """Return a new search that starts at a vector (d,).
+    """Return the state of a new search that starts at a vector (d,).
 
     frames: origin and rotation of the frame in which each waypoint moves.
     start: (d,) along, across and altitude of each inner waypoint in its frame, m.
@@ -303,13 +304,15 @@ def _continue_search(
     moves: Floats,
     initial_steps: Floats,
     state: _State,
-    pause_count: int,
+    next_check: int,
     max_evaluations: int,
 ) -> _State:
-    """Continue a search up to `pause_count` evaluations, or to its end; return its state.
+    """Continue a search up to `next_check` evaluations, or to its end; return its state.
 
     moves, initial_steps: (k, d) moves and (k,) their initial sizes; a move that fails is tried in the other direction.
-    state: its vectors are overwritten. The search ends at `max_evaluations`, or when all moves are too small.
+    state: its vectors are overwritten.
+
+    The search ends at `max_evaluations`, or when all moves are too small.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state
@@ -323,7 +326,7 @@ def _continue_search(
             copy_into(round_start, best_vector)
         # The last trial of a round repeats the displacement of the whole round (pattern move).
         for k in range(move, moves.shape[0] + 1):
-            if evaluations >= pause_count and evaluations < max_evaluations:
+            if evaluations >= next_check and evaluations < max_evaluations:
                 return _State(
                     best_vector,
                     best_merit,

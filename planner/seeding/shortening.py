@@ -52,12 +52,12 @@ MIN_MOVE_M = 0.05
 def _newton_step(
     path: Floats, min_corner: Floats, max_corner: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
-    """Fill `step` (n,) with a Newton step of a path within its box; return its largest component, m.
+    """Fill `step` (n,) with a Newton step of a path within a box; return its largest component, m.
 
     path: (w, 3) m.
     min_corner, max_corner: (3,) corners of the box, m.
-    model: gradient and Hessian at the path; coordinates at a bound that would leave the box are removed from it.
-    factor: scratch, like the band of the Hessian.
+    model: gradient and Hessian at the path; coordinates at a bound that would leave the box are removed from both.
+    factor: working memory, like the band of the Hessian.
 
     A step with a component beyond `MAX_STEP_M` is scaled down to it.
     """
@@ -91,7 +91,7 @@ class Shortening(NamedTuple):
     path: (w, 3) m.
     active: the constraints of the present round.
     multipliers: (c,) one for each constraint; it grows while the constraint is violated.
-    rounds: number of rounds done. In a round the constraints and multipliers are fixed.
+    rounds: number of completed rounds. In a round the constraints and multipliers are fixed.
     models: number of models evaluated; a model is the augmented Lagrangian of a path with its derivatives.
     corners_too: True to also constrain the height and slope of corners as they are flown.
     """
@@ -182,15 +182,15 @@ def _descend(
 ) -> int:
     """Minimise the augmented Lagrangian of a path (w, 3) in place; return the number of models evaluated.
 
-    Newton steps are taken; a step that does not lower the Lagrangian is halved several times. The descent ends after
-    some steps, after a very short step, or if no step is better.
-
     active: the active constraints and their coefficients.
     path: overwritten with the result, m.
     multipliers: (c,) multipliers of the constraints.
     values: (c,) array to fill with the final values of the constraints.
     penalty: penalty factor, 1 / m.
-    descent: box of the waypoints, and scratch.
+    descent: box of the waypoints, and working memory.
+
+    Newton steps are taken; a step that does not lower the Lagrangian is halved several times. The descent ends after
+    some steps, after a very short step, or if no halved step is better.
     """
     min_corner = descent.min_corner
     max_corner = descent.max_corner
@@ -236,8 +236,8 @@ MAX_SAMPLES = 48
 EXTRA_MARGIN_M = 0.1
 # Maximum number of models per shortening.
 MAX_MODELS = ROUND_COUNT * (2 + STEPS_PER_ROUND * HALVINGS_PER_STEP)
-# Pairs of leg and missile between two calls of `pause`: some 5 ms.
-PAIRS_PER_PAUSE = 400_000
+# Pairs of leg and missile between two calls of `check_stop`: some 5 ms.
+PAIRS_PER_CHECK = 400_000
 
 
 def shorten_path(
@@ -246,17 +246,16 @@ def shorten_path(
     *,
     extra_margin: float = EXTRA_MARGIN_M,
     corners_too: bool = False,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
-    """Shorten a path (w, 3), or reduce its violations or cost; return it and the number of evaluations.
-
-    The cost is that of `data.travel`: length, time or energy.
+    """Shorten a path (w, 3), or reduce its cost or violations; return it and the number of evaluations.
 
     extra_margin: additional margin to spheres and ground, m.
     corners_too: True to also constrain the height and slope of corners as they are flown, which is slower.
-    pause: called after some milliseconds of work; an exception raised there stops it.
+    check_stop: called after some milliseconds of work; an exception raised there stops it.
 
-    A model counts as one evaluation. Zones and the maximum height above ground are ignored.
+    The cost is defined by `data.travel`: length, time or energy. Each evaluated model is counted as one evaluation.
+    Zones and the maximum height above ground are ignored.
 
     >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
@@ -270,14 +269,14 @@ def shorten_path(
     """
     mean_length = math.dist(path[0], path[-1]) / (len(path) - 1)
     samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_SPACING_M))))
-    rounds = max(1, PAIRS_PER_PAUSE // (len(path) * max(1, len(data.missiles.missiles))))
+    rounds = max(1, PAIRS_PER_CHECK // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
     shortening: Shortening = begin_shortening(data, start, samples, extra_margin, corners_too)
     while shortening.rounds < ROUND_COUNT:
         shortening = continue_shortening(data, shortening, extra_margin, min(ROUND_COUNT, rounds))
-        pause()
+        check_stop()
     return shortening.path, int(shortening.models)
 
 

@@ -71,10 +71,10 @@ class ActiveConstraints(NamedTuple):
     low: (w - 1,) height that a leg requires in addition to the clearance, m.
     climb, dive: (w - 1,) tangents of the slope limits.
     before, after: (w,) lengths (m) that a turn takes of the legs before and after it, divided by the tangent of half
-    the turn.
+        the turn.
     roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
     turns_in_legs: True if legs must be as long as their turns.
-    turn_margin: length of a leg in addition to its turns, m.
+    turn_margin: spare length that a leg must have in addition to its turns, m.
     flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
 
@@ -139,13 +139,13 @@ def active_constraints(
 def _fill_turn_lengths(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:
-    """Fill `before` and `after` (w,): lengths of the legs that the turn at each waypoint takes up.
-
-    Each length (m) is divided by the tangent of half the turn. The quotient changes little with the turn, so that it
-    can stay fixed in a round.
+    """Fill `before` and `after` (w,) with the lengths of the legs that the turn at each waypoint takes up.
 
     path: (w, 3) m.
     legs: filled `LEG` records (w - 1,) of the path.
+
+    Each length (m) is divided by the tangent of half the turn. The quotient changes little with the turn, so that it
+    can stay fixed in a round.
     """
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
@@ -170,7 +170,7 @@ def _fill_turn_lengths(
 def _find_near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:
-    """Return pairs of a leg and a missile near it, (p, 2), and the distance required in each pair, m, (p,).
+    """Return pairs (p, 2) of a leg and a missile near it, and the distance required in each pair, (p,) m.
 
     path: (w, 3) m.
     corners: filled `CORNER` records (w,) of the path.
@@ -211,9 +211,10 @@ def _find_near_missiles(
 
 @inner
 def constraint_count(active: ActiveConstraints) -> int:
-    """Return the number of all constraints in `lagrangian`.
+    """Return the number of constraints in `lagrangian`.
 
-    Their order is: pairs of leg and missile, ground samples, slopes and lengths of legs, turns, and flown corners.
+    The constraints are, in this order: pairs of leg and missile, ground samples, slopes and lengths of legs, turns, and
+    flown corners.
     """
     legs = active.low.size
     return active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES_PER_CORNER)
@@ -283,7 +284,7 @@ class LagrangianModel(NamedTuple):
 def _add_constraint(
     value: float, first_waypoint: int, waypoint_count: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:
-    """Add a constraint on consecutive waypoints to the model; return its contribution to the merit.
+    """Add a constraint on consecutive waypoints to the model; return its contribution to the Lagrangian.
 
     value: value of the constraint, m; negative if violated.
     first_waypoint, waypoint_count: the waypoints of the path on which the value depends.
@@ -372,15 +373,15 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Add the distances between legs and missiles to the model; return their contribution to the merit.
-
-    These are the first constraints. Their value is the distance beyond the required distance from the missile, m.
+    """Add the distances between legs and missiles to the model; return their contribution to the Lagrangian.
 
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.
-    values: (c,) values of all constraints; those added here are filled.
+    values: (c,) values of all constraints; the values of the constraints added here are filled.
     penalty: penalty factor, 1 / m.
     model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
+
+    These are the first constraints. Their value is the distance beyond the required distance from the missile, m.
     """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
@@ -413,16 +414,16 @@ def _add_ground(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add a clearance constraint for each ground sample of a leg; return their contribution to the merit.
-
-    The value of a constraint is the height above the required clearance, m.
+    """Add a clearance constraint for each ground sample; return their contribution to the Lagrangian.
 
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.
-    values: (c,) values of all constraints; those added here are filled.
+    values: (c,) values of all constraints; the values of the constraints added here are filled.
     penalty: penalty factor, 1 / m.
     model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
     first_number: number of the first of these constraints.
+
+    The value of a constraint is the height above the required clearance, m.
     """
     merit = 0.0
     slopes = model.slopes
@@ -459,17 +460,17 @@ def _add_corners(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the heights of flown corners and the lengths of steep arcs; return their contribution to the merit.
+    """Add the heights of flown corners and the lengths of steep arcs; return their contribution.
 
-    A height is measured above the required height (m), a length beyond the length that the arc needs (m).
-
-    flown: the corners that are flown near the ground or almost as steeply as possible; others have the radius 0.
+    flown: the corners that are flown near the ground or almost as steeply as possible; other corners have the radius 0.
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.
-    values: (c,) values of all constraints; those added here are filled.
+    values: (c,) values of all constraints; the values of the constraints added here are filled.
     penalty: penalty factor, 1 / m.
     model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
     first_number: number of the first of these constraints.
+
+    A height is measured above the required height (m), a length beyond the length that the arc needs (m).
     """
     merit = 0.0
     point = np.empty(3)
@@ -515,18 +516,18 @@ def _add_slopes(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the limits on slopes and on lengths of legs; return their contribution to the merit.
-
-    A leg has three constraints on its climb, its descent and its length. The
-    value of a slope is the height that could
-    still be climbed or descended (m), that of a length is the excess over the minimum (m).
+    """Add the limits on slopes and on lengths of legs; return their contribution to the Lagrangian.
 
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.
-    values: (c,) values of all constraints; those added here are filled.
+    values: (c,) values of all constraints; the values of the constraints added here are filled.
     penalty: penalty factor, 1 / m.
     model: gradient and Hessian of the augmented Lagrangian, to which the constraints are added.
     first_number: number of the first of these constraints.
+
+    A leg has three constraints on its climb, its descent and its length. The value of a slope constraint is the height
+    that could still be climbed or descended (m); the value of a length constraint is the excess over the minimum length
+    (m).
     """
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
@@ -561,11 +562,14 @@ def _add_turns(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the limits on turns, and on legs that hold them; return their contribution to the merit.
+    """Add the limits on turns, and on legs that contain them; return their contribution to the Lagrangian.
 
-    The value of a turn is the margin to its limit, scaled to m; that of a leg is the length, m, that remains.
-    path, penalty: (w, 3) m, and penalty factor, 1 / m. model: gradient and Hessian, to which the constraints are added.
-    multipliers, values: (c,) of all constraints; the values from `first_number` on are filled.
+    path: (w, 3) m.
+    multipliers, values: (c,) multipliers and values of all constraints; the values from `first_number` on are filled.
+    penalty: penalty factor, 1 / m.
+    model: gradient and Hessian, to which the constraints are added.
+
+    The value of a turn is the margin to its limit, scaled to m; the value of a leg is its spare length, m.
     """
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)
@@ -615,11 +619,13 @@ def _add_turns(
 
 @inner
 def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
-    """Add a multiple of a turn's derivatives by its three waypoints to `slopes` (3, 3), a row for each.
+    """Add a multiple of a turn's derivatives by its three waypoints to `slopes` (3, 3), one row per waypoint.
 
-    before_derivatives, after_derivatives: derivatives of the turn with respect to the leg before it and to the leg
-        after it, (2,): east and north. A waypoint changes the legs that end or begin at it.
+    before_derivatives, after_derivatives: derivatives of the turn with respect to the vectors of the legs before and
+        after it, (2,): east and north.
     factor: factor on the derivatives.
+
+    A waypoint changes the legs that end or begin at it.
     """
     for axis in range(2):
         slopes[0, axis] -= factor * before_derivatives[axis]
@@ -638,14 +644,14 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Return the augmented Lagrangian of a path (w, 3), and fill its derivatives.
-
-    It is the length or cost of the path, m, plus a term for each constraint, which increases with its violation.
+    """Compute the augmented Lagrangian of a path (w, 3), m, and fill its derivatives.
 
     multipliers: (c,) multipliers of the constraints.
     values: (c,) array to fill with the values of the constraints, in the order of `constraint_count`.
     penalty: weight of the squared violations, per m.
     model: filled with gradient and Hessian.
+
+    It is the length or cost of the path plus a term for each constraint, which increases with its violation.
     """
     model.gradient[:], model.band[:] = 0.0, 0.0
     first_number = active.pairs.shape[0]

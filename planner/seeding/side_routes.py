@@ -1,8 +1,9 @@
 """Find routes that pass obstacles on other sides than the cheapest route does, one per choice of sides.
 
-Two passes of dynamic programming over the same grid, from the start and from the destination, meet in every cell, and
-the sum of their costs is the cost of the cheapest route through it. The smallest sum to the left of an obstacle belongs
-to the cheapest of all routes that pass it on the left; the same two passes give this for every obstacle and side.
+Two passes of dynamic programming run over the same grid, one from the start and one from the destination. The sum of
+their costs in a cell is the cost of the cheapest route through this cell. The smallest sum to the left of an obstacle
+is the cost of the cheapest of all routes that pass it on the left; the same two passes give this for every obstacle and
+side.
 """
 
 import math
@@ -82,8 +83,8 @@ def _relax_stage_back(
 
     next_costs: (layers, across) costs from the cells of the next stage to the destination.
     cell_costs: (layers, across) cost per m of the steps to the cells of the next stage.
-    costs: output, (layers, across): costs from the cells of this stage to the destination.
-    successors: output, (layers, across): cells of the next stage to which the cheapest routes lead.
+    costs: (layers, across) array to fill: costs from the cells of this stage to the destination.
+    successors: (layers, across) array to fill: cells of the next stage to which the cheapest routes lead.
     spans: `SPAN` records (layers,) of this stage's cells whose cost is within the route-cost bound.
     step_layers: steepest climb and descent from this stage, as `layers_per_step` returns them.
     step: length of a step along the line, m.
@@ -136,12 +137,15 @@ def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Reco
 
 
 class SideSearch(NamedTuple):
-    """Computation of `GridCosts` that can be continued after a pause: first forward, then backward.
+    """State of a computation of `GridCosts`, which is continued stage by stage.
+
+    Costs from the start are computed forwards, then costs to the destination backwards.
 
     step_layers: steepest climb and descent of a step, as `layers_per_step` returns them.
-    cell_costs: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
-    cells within the bound. stages_done: number of completed stages, forwards and then backwards; at the
-    end twice the number of stages of the grid.
+    cell_costs: cost per m of the cells, (stages + 1, layers, across).
+    spans: `SPAN` records (stages + 1, layers) of the cells within the bound.
+    stages_done: number of completed stages, forwards and then backwards; at the end twice the number of stages of the
+        grid.
     """
 
     costs: GridCosts
@@ -154,29 +158,29 @@ class SideSearch(NamedTuple):
     stages_done: int
 
 
-# Number of cells reached between two calls of `pause`: some 10 ms.
-CELLS_PER_PAUSE = 100_000
+# Number of cells reached between two calls of `check_stop`: some 10 ms.
+CELLS_PER_CHECK = 100_000
 
 
 def grid_costs(
-    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, check_stop: Callable[[], None] = lambda: None
 ) -> GridCosts:
     """Compute the costs of the cheapest routes to each cell of a grid, and on to the destination.
 
     bound: upper limit on the cost of a whole route.
-    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    check_stop: called after every `CELLS_PER_CHECK` cells; an exception raised there stops the search.
     """
-    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
+    stages = max(1, CELLS_PER_CHECK // (grid.across.size * grid.layers.size))
     search: SideSearch = begin_grid_costs(data, frame, grid)
     while search.stages_done < 2 * grid.stages:
         search = continue_grid_costs(data, frame, grid, bound, search, stages)
-        pause()
+        check_stop()
     return search.costs
 
 
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
-    """Return a new search for the costs of partial routes over a grid, before its first stage."""
+    """Make the state of a computation of `GridCosts`, before its first stage."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     shape = (stages + 1, layer_count, width)
@@ -202,10 +206,13 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, max_stages: int
 ) -> SideSearch:
-    """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it.
+    """Continue a computation by up to `max_stages` stages, or end it early; return its state.
 
-    The first half of the stages computes costs from the start forwards, the second half costs to the destination.
-    bound, search: upper limit on the cost of a route, and state of the search, whose arrays are overwritten.
+    bound: upper limit on the cost of a route.
+    search: state of the computation; its arrays are overwritten.
+
+    The first half of the stages computes the costs from the start forwards, the second half the costs to the
+    destination. The computation ends early if no route can continue.
     """
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
@@ -330,13 +337,14 @@ SAME_ROUTE_DISTANCE_M = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle beyond the route's ends.
+    """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle it does not pass.
 
     points: (s, 3) along, across, up, m.
     obstacles: `OBSTACLE` records (k,).
 
-    Two routes with the same sides can be deformed into each other without touching an obstacle. Routes with different
-    sides are treated as different, although a route over a sphere on the ground could be moved to either side of it.
+    A route does not pass an obstacle beyond its ends. Two routes with the same sides can be deformed into each other
+    without touching an obstacle. Routes with different sides are treated as different, although a route over a sphere
+    on the ground could be moved to either side of it.
     """
     step = points[1, 0] - points[0, 0]
     stages = np.rint(obstacles["along"] / step).astype(np.int64)
@@ -359,21 +367,21 @@ def side_routes(
     grid: Grid,
     bound: float,
     max_routes: int,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
 ) -> list[GridRoute]:
     """Return routes that pass the obstacles on different sides, cheapest first.
 
     bound: upper limit on the cost.
     max_routes: maximum number of routes.
-    pause: called from time to time; an exception raised there stops the search.
+    check_stop: called from time to time; an exception raised there stops the search.
 
-    Each route is the cheapest that passes one obstacle on one side; the first route is the cheapest of all. Among
-    routes close to each other, only the cheapest is returned.
+    Each route is the cheapest route past one obstacle on one side; the first route is the cheapest of all. Among routes
+    close to each other, only the cheapest is returned.
     """
     if grid.layers.size == 0:
         return []
     step = frame.length / grid.stages
-    costs = grid_costs(data, frame, grid, bound, pause)
+    costs = grid_costs(data, frame, grid, bound, check_stop)
     obstacles = find_obstacles(data, frame, step, grid.shrink)
     passings = cheapest_passings(costs, grid, obstacles, step).ravel()
     passings = passings[np.isfinite(passings["cost"])]

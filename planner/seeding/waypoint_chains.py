@@ -26,8 +26,8 @@ from world.terrain import pixel_height
 TURN_COST = 2e4
 # Fraction of a leg that each of its two turns may take.
 TURN_LENGTH_FRACTION = 0.475
-# Legs evaluated between two calls of `pause`: at most some 20 ms on a slow processor.
-LEGS_PER_PAUSE = 2_500
+# Legs evaluated between two calls of `check_stop`: at most some 20 ms on a slow processor.
+LEGS_PER_CHECK = 2_500
 # Larger than any number of legs.
 ALL_LEGS = 2**62
 # Progress: direction, next waypoint and candidate, and number of legs evaluated.
@@ -63,7 +63,7 @@ class WaypointChains(NamedTuple):
     legs: int
 
     def path_through(self, waypoint: int, candidate: int) -> Ints:
-        """Return which candidate of each waypoint the best path through a given candidate uses, (w,)."""
+        """Return the indices of the candidates on the best path through a given candidate, (w,)."""
         out = np.empty(len(self.cost), dtype=np.int64)
         out[waypoint] = candidate
         for i in range(waypoint, 0, -1):
@@ -77,15 +77,15 @@ def waypoint_chains(
     data: ProblemArrays,
     candidates: Floats,
     bound: float,
-    pause: Callable[[], None] = lambda: None,
+    check_stop: Callable[[], None] = lambda: None,
     max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
     """Find the best path through each candidate position of each waypoint.
 
     candidates: (w, k, 3) m; only the first candidate of each end is used.
     bound: upper limit on the cost of a path, m; paths above it are dropped, which saves time.
-    pause: called after every `LEGS_PER_PAUSE` legs; an exception raised there stops the work.
-    max_legs: maximum number of legs to evaluate; if it is not sufficient, no path is returned.
+    check_stop: called after every `LEGS_PER_CHECK` legs; an exception raised there stops the work.
+    max_legs: maximum number of legs to evaluate; if it is not sufficient, all costs are inf.
     """
     count, width, _ = candidates.shape
     legs = np.zeros((count - 1, width, width))
@@ -96,9 +96,9 @@ def waypoint_chains(
     cursor["step"], cursor["waypoint"] = 1, 1
     evaluated_legs = 0
     while not _advance_sweeps(
-        data, candidates, legs, bound, sweeps, cursor, min(LEGS_PER_PAUSE, max_legs - evaluated_legs)
+        data, candidates, legs, bound, sweeps, cursor, min(LEGS_PER_CHECK, max_legs - evaluated_legs)
     ):
-        pause()
+        check_stop()
         evaluated_legs = int(cursor["legs"][0])
         if evaluated_legs >= max_legs:
             return WaypointChains(np.full((count, width), np.inf), before, after, evaluated_legs)
@@ -271,13 +271,13 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path; else 0.
+    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path; 0 for other turns.
 
     previous_waypoint, waypoint, next_waypoint: (3,) m.
-    corners: scratch, one `CORNER` record.
+    corners: working memory, one `CORNER` record.
 
-    A missing leg length of 100 m costs as much as an excess of 1 rad; it costs at most as much as 10 rad. A corner at a
-    leg without length costs as much as 1 rad.
+    Each 100 m of missing leg length cost as much as an excess of 1 rad, up to 10 rad. A corner at a leg without length
+    costs as much as 1 rad.
     """
     ux = waypoint[0] - previous_waypoint[0]
     uy = waypoint[1] - previous_waypoint[1]

@@ -15,7 +15,7 @@ from planner.evaluation.airspace_scores import airspace_excess
 from planner.evaluation.encoding import Encoding, RotatedFrame, WaypointFrames, require_frames, straight_frames
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
 from planner.evaluation.problem import ProblemArrays
-from planner.evaluation.terrain_clearance import lag_length, segment_pixels, terrain_excess
+from planner.evaluation.terrain_clearance import clearance_deficit, lag_length, segment_pixels
 from planner.evaluation.threat_index import kill_density
 from planner.seeding.grids import KILL_COST
 from world.arrays import Floats, Ints
@@ -34,7 +34,7 @@ def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats
     """Return the length of the leg a-b plus the cost of its violations, m of path.
 
     a, b: ends of the leg, (3,) m.
-    Once the cost exceeds `max_cost`, the evaluation ends; the result is then a lower bound.
+    max_cost: cost above which the evaluation ends; the result is then a lower bound.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     horizontal_length = math.sqrt(dx * dx + dy * dy)
@@ -48,7 +48,7 @@ def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats
     depth_below = (
         _max_depth_below_leg(data, limits, ux, uy, horizontal_length, a[2], b[2]) if data.tracking.has_error else 0.0
     )
-    total += DEPTH_COST * terrain_excess(
+    total += DEPTH_COST * clearance_deficit(
         data.heights,
         data.slope_bounds,
         limits.required,
@@ -106,9 +106,9 @@ def _max_depth_below_leg(
     horizontal_length: m.
     start_altitude, end_altitude: m AMSL.
 
-    The altitude lags by the lag length times the slope. On a leg with a smaller change of altitude than the step of the
-    tracking error, the final altitude is demanded from the start. The aircraft then flies at that altitude, and differs
-    from the leg by the whole change.
+    The altitude lags by the lag length times the slope. On a leg whose altitude changes by less than the autopilot's
+    step, the final altitude is demanded from the start; the aircraft then flies at that altitude, and differs from the
+    leg by the whole change.
     """
     altitude_change = end_altitude - start_altitude
     if abs(altitude_change) < data.tracking.step:
@@ -207,13 +207,13 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
-    """Choose waypoints among candidate points, move them locally, and return them with both ends, (w, 3).
+    """Choose waypoints among candidate points, move them locally, and return the path (w, 3), m.
 
     frames: origin and rotation of the frame in which each waypoint moves.
     points: (w - 2, k, 3) candidates of each inner waypoint, in the frame of the waypoint, m.
     fit: heights by which the candidates are also lifted, m, and the pattern of the moves.
 
-    The returned waypoints are world positions, m.
+    The path includes both ends, and is in world positions.
     """
     inner_count, width, _ = points.shape
     candidates = np.zeros((inner_count + 2, width * len(fit.lifts), 3))
@@ -234,7 +234,8 @@ def move_all_waypoints(
     rounds: number of times that all waypoints may move.
     scale: size of the first moves relative to `FIRST_MOVES`.
 
-    Single legs are evaluated, turns are not. Returns the new vector and the equivalent number of path evaluations.
+    The cost of single legs is evaluated; turns have no cost. Returns the new vector and the equivalent number of path
+    evaluations.
     """
     frames = require_frames(encoding)
     path = np.zeros((encoding.waypoints, 3))
@@ -280,13 +281,12 @@ def _move_waypoints(
 
 
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
-    """Return the chosen candidate of each waypoint in its frame, (w, 3), and the number of legs evaluated.
-
-    The sum of the costs of the legs between the chosen candidates is smallest.
-
+    """Choose the candidate of each waypoint for which the sum of the leg costs is smallest.
 
     frames: origin and rotation of the frame in which each waypoint moves.
     candidates: (w, k, 3) candidates in these frames, m; the ends are overwritten with the fixed ends.
+
+    Returns the chosen candidates, (w, 3) in their frames, and the number of legs evaluated.
     """
     inner_count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
@@ -297,9 +297,9 @@ def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Fl
 
 
 def _candidates_to_world(frames: WaypointFrames, candidates: Floats) -> Floats:
-    """Return the world positions of candidates (w, c, 3).
+    """Convert candidates (w, c, 3) in their frames to world positions, (w, c, 3) m.
 
-    An end is in the frame of the waypoint next to it.
+    The start and the destination are given in the frame of the waypoint next to them.
     """
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])

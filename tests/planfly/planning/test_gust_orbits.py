@@ -15,7 +15,7 @@ from planfly.workflow.make_plan import make_plan
 from planfly.workflow.uav import Uav, load_uav
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from planner.search.seeds import with_waypoints
+from planner.search.seeds import halve_longest_legs
 from tests.setups import spec_around, with_path
 from world.scenario import Scenario, scenario_from_spec
 
@@ -139,7 +139,7 @@ def test_no_path_with_few_waypoints_is_sought_if_the_usual_number_was_too_small(
     found = plan_path(scenario_of("moderate"), airframe_of_x8.limits.with_margin(), seed=SEED)
     tight = Px4(airframe_of_x8.autopilot.with_parameters(NAV_FW_ALT_RAD=5.0).parameters)  # type: ignore[arg-type]
     uav, asked = replace(airframe_of_x8, autopilot=tight), list[int]()
-    plan = with_path(found, with_waypoints(found.waypoints, waypoints))
+    plan = with_path(found, halve_longest_legs(found.waypoints, waypoints))
     assert not limit_waypoint_orbits(plan, uav, searching(uav, asked)).safe
     assert asked == asked_counts
 

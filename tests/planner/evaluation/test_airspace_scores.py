@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planner.evaluation.airspace_scores import airspace_counts, airspace_excess, airspace_pieces
+from planner.evaluation.airspace_scores import airspace_excess, airspace_pieces, count_airspace_violations
 from planner.evaluation.certify import certify
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.problem import (
@@ -252,7 +252,7 @@ def test_pieces_that_touch_a_zone_are_counted(
 ) -> None:
     scenario = small(**GROUND, zones=mast(east, 300.0 + SEARCH_ZONE_MARGIN_M + more))
     data = make_problem(scenario, make_limits(scenario)).search
-    assert airspace_counts(data, ONE_LEG[None]).tolist() == [inside * pieces]
+    assert count_airspace_violations(data, ONE_LEG[None]).tolist() == [inside * pieces]
 
 
 @pytest.mark.parametrize(("more", "pieces"), [(-1.0, 0), (1.0, 6)])
@@ -262,7 +262,7 @@ def test_pieces_above_the_greatest_height_are_counted(
     scenario = small(**GROUND, limits={"max_height_m": 200.0})
     data = make_problem(scenario, make_limits(scenario)).search
     path = ONE_LEG + np.array([0.0, 0.0, 50.0 - SEARCH_BUFFER_M + more])
-    assert airspace_counts(data, np.stack([ONE_LEG, path])).tolist() == [0, pieces]
+    assert count_airspace_violations(data, np.stack([ONE_LEG, path])).tolist() == [0, pieces]
 
 
 @pytest.mark.parametrize("algorithm", ["umda", "umda-polar-45", "umda-bearing", "umda-graded"])

@@ -10,12 +10,12 @@ import pytest
 from aircraft.envelope import turn_radius
 from aircraft.path_limits import Limits
 from planner.evaluation.certify_kernels import (
+    add_end_course_points,
     heights_above_ground,
     leg_slope_limits,
     missile_distance,
     tracked_pieces,
     turn_and_roll_lengths,
-    with_end_course_points,
 )
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, BUFFER_GROWTH_RATIO, ProblemArrays, make_problem
 from tests.planner.tracking_limits import with_tracking_error
@@ -148,12 +148,12 @@ def test_the_arc_inside_a_corner_counts_too(make_certified: Callable[..., Proble
 
 def test_courses_asked_for_become_far_points_on_them(make_certified: Callable[..., ProblemArrays]) -> None:
     start, destination = make_ends(course_deg=0), make_ends(east=6000, course_deg=90)
-    out = with_end_course_points(make_certified(start=start, destination=destination), CORNER)
+    out = add_end_course_points(make_certified(start=start, destination=destination), CORNER)
     np.testing.assert_array_equal(out[1:-1], CORNER)
     # It comes from the south, and leaves to the east, level.
     assert out[0].tolist() == pytest.approx([0.0, -1e4, 150.0])
     assert out[-1].tolist() == pytest.approx([12_000.0, 1500.0, 150.0])
-    free = with_end_course_points(make_certified(), CORNER)
+    free = add_end_course_points(make_certified(), CORNER)
     # On the legs' own lines.
     assert free[0].tolist() == [-2000.0, 0.0, 150.0]
     assert free[-1].tolist() == [2000.0, 3000.0, 150.0]

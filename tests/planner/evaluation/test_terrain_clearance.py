@@ -11,7 +11,7 @@ import pytest
 from aircraft.path_limits import Limits, downwind_vector
 from planner.evaluation.corners import LEG, measure_legs
 from planner.evaluation.problem import SlopeBounds, make_problem, required_clearance
-from planner.evaluation.terrain_clearance import HEIGHT_LAG, compute_height_lags, lag_at, terrain_excess
+from planner.evaluation.terrain_clearance import HEIGHT_LAG, clearance_deficit, compute_height_lags, lag_at
 from tests.planner.tracking_limits import with_tracking_error
 from world.arrays import Floats
 from world.kernels import read_only
@@ -85,11 +85,11 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
         for off in (0.5, -step):
             height = wanted + off
             line = a[0], a[1], height, b[0], b[1], height + rise
-            depth = terrain_excess(data.heights, data.slope_bounds, required, 0.0, tuple(ends), *line, math.inf)
+            depth = clearance_deficit(data.heights, data.slope_bounds, required, 0.0, tuple(ends), *line, math.inf)
             assert (depth > 0.0) == (off < 0.0)
             # With more wanted by what it is clear, or less by what it is deep and a step between samples.
             need = step if off > 0.0 else -step - 0.5
-            more = terrain_excess(data.heights, data.slope_bounds, required, need, tuple(ends), *line, math.inf)
+            more = clearance_deficit(data.heights, data.slope_bounds, required, need, tuple(ends), *line, math.inf)
             assert (more > 0.0) == (off > 0.0)
             both[int(depth > 0.0)] += 1
     assert both.min() > 100

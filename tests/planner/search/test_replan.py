@@ -11,7 +11,7 @@ from aircraft.path_limits import Limits
 from planner.plan import Plan, parse_plan, plan_json
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan
-from planner.search.seeds import with_waypoints
+from planner.search.seeds import halve_longest_legs
 from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError, ScenarioError
 from world.geometry import turning_angles
@@ -90,7 +90,7 @@ def test_legs_that_are_not_there_and_other_missions_are_refused(
 
 def test_longest_legs_are_split() -> None:
     path = np.array([[0.0, 0, 0], [1000, 0, 100], [1100, 0, 100]])
-    np.testing.assert_allclose(with_waypoints(path, 5)[:, 0], [0, 250, 500, 1000, 1100])
+    np.testing.assert_allclose(halve_longest_legs(path, 5)[:, 0], [0, 250, 500, 1000, 1100])
 
 
 def test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refused(old: Plan, limits: Limits) -> None:

@@ -227,10 +227,10 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
     problem = make_problem(scenario, make_limits(scenario))
     encoding = ENCODINGS["rotated"](problem.space, scenario.planner.waypoints)
     search = Search(problem, ALGORITHMS[DEFAULT], encoding, stream(1, PLANNER), None, lambda: "over", False, 10.0)
-    for _ in range(search_state.GRACE_PAUSES - 1):
-        search.pause()
+    for _ in range(search_state.GRACE_CHECKS - 1):
+        search.check_stop()
     with pytest.raises(SearchEnded):
-        search.pause()
+        search.check_stop()
     assert search.end_reason == "over"
     line = encoding.decode(search.archive.vectors)[0]
     np.testing.assert_allclose(line[[0, -1]], [scenario.start, scenario.destination])
@@ -238,7 +238,7 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
     np.testing.assert_allclose(line, line[0] + shares[:, None] * (line[-1] - line[0]), atol=1e-6)
     # With a result it ends at once.
     with pytest.raises(SearchEnded):
-        search.pause()
+        search.check_stop()
 
 
 def test_among_zones_a_stop_ends_a_search_whenever_it_comes() -> None:
@@ -255,7 +255,7 @@ def test_among_zones_a_stop_ends_a_search_whenever_it_comes() -> None:
         plan = plan_path(scenario, limits, seed=1, stop=lambda after=after: end(after))  # type: ignore[misc]
         assert plan.ended == "interrupted"
         assert len(plan.waypoints) == scenario.planner.waypoints
-        assert len(asked) <= after + search_state.GRACE_PAUSES + 4
+        assert len(asked) <= after + search_state.GRACE_CHECKS + 4
 
 
 def test_few_paths_are_certified_once_a_search_is_to_end(

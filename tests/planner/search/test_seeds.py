@@ -75,7 +75,7 @@ def lattice_without_routes(searches: list[LatticeCall], expanded: int) -> Callab
         data: ProblemArrays,
         frame: RotatedFrame,
         step: float,
-        pause: Callable[[], None],
+        check_stop: Callable[[], None],
         max_states: int,
         *,
         is_guided: bool,

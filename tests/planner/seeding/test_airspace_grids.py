@@ -215,7 +215,7 @@ def test_a_search_in_slices_finds_the_same_route_and_asks_after_each(
     assert len(whole) == 61
     assert len(asked) == 1
     # Two stages of 41 x 3 cells at once: each of thirty slices.
-    monkeypatch.setattr(airspace_grids, "CELLS_PER_PAUSE", 2 * 41 * 3)
+    monkeypatch.setattr(airspace_grids, "CELLS_PER_CHECK", 2 * 41 * 3)
     sliced, same = cheapest_airspace_route(data, frame, grid, extra, np.inf, lambda: asked.append(0))
     assert len(asked) == 1 + 30
     np.testing.assert_array_equal(whole, sliced)
@@ -239,7 +239,7 @@ def test_a_search_that_comes_no_further_ends(made: Made, monkeypatch: pytest.Mon
     data = made(zones=[wall(-2900.0, 2900.0)])
     frame = rotated_frame(data.start, data.destination)
     grid, asked = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0), list[int]()
-    monkeypatch.setattr(airspace_grids, "CELLS_PER_PAUSE", 1)
+    monkeypatch.setattr(airspace_grids, "CELLS_PER_CHECK", 1)
     points, cost = cheapest_airspace_route(
         data, frame, grid, np.zeros((61, ACROSS.size)), np.inf, lambda: asked.append(0)
     )

@@ -247,7 +247,7 @@ def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: p
     made = make_lattice(data, frame, 500.0)
     whole, seen = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
     asked: list[int] = []
-    monkeypatch.setattr(lattice_module, "STATES_PER_PAUSE", 7)
+    monkeypatch.setattr(lattice_module, "STATES_PER_CHECK", 7)
     sliced, same = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
     assert len(whole) > 0
     assert len(asked) > 10

@@ -130,13 +130,13 @@ def test_it_asks_after_some_evaluations_and_ends_with_what_it_has(
         return end
 
     whole, made = search_patterns(problem.search, encoding, vector, 400)
-    monkeypatch.setattr(pattern_search, "EVALUATIONS_PER_PAUSE", 1)
+    monkeypatch.setattr(pattern_search, "EVALUATIONS_PER_CHECK", 1)
     sliced, same = search_patterns(problem.search, encoding, vector, 400, lambda: ask(False))
     np.testing.assert_array_equal(whole, sliced)
     assert made == same
     # A move is tried on one side or on both.
     assert 200 <= len(asked) <= 400
-    monkeypatch.setattr(pattern_search, "EVALUATIONS_PER_PAUSE", 60)
+    monkeypatch.setattr(pattern_search, "EVALUATIONS_PER_CHECK", 60)
     few, made = search_patterns(problem.search, encoding, vector, 60)
     stopped, same = search_patterns(problem.search, encoding, vector, 400, lambda: ask(True))
     np.testing.assert_array_equal(few, stopped)

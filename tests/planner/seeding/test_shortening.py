@@ -105,10 +105,10 @@ def test_in_the_open_it_is_straight(make_limits: Callable[[Scenario], Limits], s
 def test_many_missiles_are_looked_at_in_slices_with_the_same_result(monkeypatch: pytest.MonkeyPatch) -> None:
     data, start = make_task("hard-60").problem.search, first_path("hard-60")
     asked: list[int] = []
-    whole, models = shorten_path(data, start, pause=lambda: asked.append(0))
+    whole, models = shorten_path(data, start, check_stop=lambda: asked.append(0))
     assert len(asked) == 1
-    monkeypatch.setattr(shortening, "PAIRS_PER_PAUSE", 1)
-    sliced, again = shorten_path(data, start, pause=lambda: asked.append(0))
+    monkeypatch.setattr(shortening, "PAIRS_PER_CHECK", 1)
+    sliced, again = shorten_path(data, start, check_stop=lambda: asked.append(0))
     assert len(asked) == 1 + shortening.ROUND_COUNT
     np.testing.assert_array_equal(whole, sliced)
     assert models == again

@@ -133,7 +133,7 @@ def test_costs_in_slices_are_the_same_and_it_asks_after_each(
     whole = grid_costs(data, frame, GRID, 9000.0, lambda: asked.append(0))
     assert len(asked) == 1
     # One stage of ten cells at once: there and back over six.
-    monkeypatch.setattr(side_routes_module, "CELLS_PER_PAUSE", 10)
+    monkeypatch.setattr(side_routes_module, "CELLS_PER_CHECK", 10)
     sliced = grid_costs(data, frame, GRID, 9000.0, lambda: asked.append(0))
     assert len(asked) == 1 + 12
     for one, other in zip(whole, sliced, strict=True):
