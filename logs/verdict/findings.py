@@ -147,7 +147,8 @@ class Finding:
         """
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
-        errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
+        sign = 1.0 if self.at_least else -1.0
+        errors = {value: abs(sign * (value - self.limit) - self.margin) for value in (self.flown, self.planned)}
         return min(errors, key=lambda value: errors[value])
 
     @property

@@ -788,15 +788,15 @@ def missed_value_lines(
     trim_throttle, stated_sink = file_parameters.get("TRIM_THROTTLE"), file_parameters.get("TECS_SINK_MIN")
     texts = []
     if trim_throttle is not None and round(throttle) != round(trim_throttle):
-        texts.append(f"TRIM_THROTTLE {trim_throttle:g}, although the model needs {throttle:.0f} % in level flight")
+        texts.append(f"TRIM_THROTTLE {trim_throttle:g}: it needs {throttle:.0f} % in level flight")
     if stated_sink is not None and abs(sink / stated_sink - 1.0) > _RATE_TOLERANCE_RATIO:
-        texts.append(f"TECS_SINK_MIN {stated_sink:g} m/s, although the model sinks {sink:.2f} m/s without power")
+        texts.append(f"TECS_SINK_MIN {stated_sink:g} m/s: it sinks {sink:.2f} m/s without power")
     if climb_shortfall:
         climb = file_parameters["TECS_CLMB_MAX"]
         model_climb = cruise * math.sin(math.asin(climb / cruise) - climb_shortfall)
         limit_text = f"THR_MAX {file_parameters['THR_MAX']:g}"
-        texts.append(f"TECS_CLMB_MAX {climb:g} m/s, although the model climbs {model_climb:.1f} m/s at {limit_text}")
-    return [f"`ardupilot.parm` keeps the file's {text}." for text in texts]
+        texts.append(f"TECS_CLMB_MAX {climb:g} m/s: it climbs {model_climb:.1f} m/s at {limit_text}")
+    return [f"The model does not meet the file's {text}. `ardupilot.parm` keeps the file's value." for text in texts]
 
 
 def _climb_names(stated: AircraftParameters) -> list[str]:

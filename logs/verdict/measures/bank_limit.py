@@ -12,7 +12,8 @@ def bank_limit_text(setup: FlightSetup) -> str:
     """Return a text on a setup's bank limit and its source, such as "the aircraft's bank limit of 29°".
 
     The source is the aircraft, the autopilot or the scenario: the first one that has this limit.  If none has it, the
-    text names no source: "a bank limit of 29°".  A guessed limit of the aircraft is marked as a guess.
+    text names no source: "a bank limit of 29°".  A guessed limit of the aircraft is marked as a guess, and is named only
+    if the autopilot and the scenario do not have the same limit.
 
     >>> from logs.recording.example_log import example_log
     >>> bank_limit_text(example_log().setup)
@@ -24,6 +25,8 @@ def bank_limit_text(setup: FlightSetup) -> str:
     ]
     if (stated_bank := setup.scenario.flight.max_bank_deg) is not None:
         limits.append(("the scenario's", math.radians(stated_bank)))
+    if setup.envelope.bank_guessed:
+        limits = [*limits[1:], limits[0]]
     owner = next((owner for owner, limit in limits if abs(limit - setup.max_bank) <= _SAME_BANK_RAD), "a")
-    guess_text = " (a guess: state --bank)" if setup.envelope.bank_guessed and owner == limits[0][0] else ""
+    guess_text = " (a guess: state --bank)" if setup.envelope.bank_guessed and owner == "the aircraft's" else ""
     return f"{owner} bank limit of {math.degrees(setup.max_bank):.0f}°{guess_text}"

@@ -268,7 +268,8 @@ class Returns:
                 break
             if math.isnan(ret.energy_used):
                 return PointOfNoReturn("used")
-            if math.isnan(ret.time_to_loiter) or math.isnan(ret.energy_left):
+            if ret.kind == "ground" or math.isnan(ret.time_to_loiter) or math.isnan(ret.energy_left):
+                # A return may reach its loiter and hit the ground on the way from there to the landing.
                 skipped_count += 1
             elif ret.energy_left < self.reserve:
                 return PointOfNoReturn(

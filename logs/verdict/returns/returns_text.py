@@ -204,7 +204,7 @@ def returns_headline(returns: Returns) -> str:
         lowest_return = min(high_returns, key=lambda ret: ret.clearance)
         energies_left = [ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)]
         energy_text = f", and at least {quantity_text(min(energies_left), 'Wh')} are left" if energies_left else ""
-        end_text = " up to their landing" if returns.lands else ""
+        end_text = f" up to {'its' if total == 1 else 'their'} landing" if returns.lands else ""
         height_text = f"never lower than {lowest_return.clearance:.0f} m above ground"
         judged_text = f"{subject} {verb} safe{end_text}: {height_text}{energy_text}"
     return f"{incomplete_text}{judged_text}{low_text}{omitted_text}{landing_suffix}"
@@ -235,7 +235,8 @@ def point_of_no_return_text(returns: Returns) -> str:
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
             left_text = f"at least {quantity_text(point.remaining_energy, 'Wh')} are left"
-            text = f"{name}: none, because every return leaves {reserve} ({left_text})"
+            arrives_text = "every return that arrives" if point.skipped_count else "every return"
+            text = f"{name}: none, because {arrives_text} leaves {reserve} ({left_text})"
     if not point.skipped_count:
         return text
     verb, be = ("does", "is") if point.skipped_count == 1 else ("do", "are")

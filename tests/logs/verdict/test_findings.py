@@ -339,3 +339,13 @@ def test_a_table_has_a_row_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MissingExtraError, match=r"^to_pandas\(\) needs the extra 'tables'"):
         made_verdict().to_pandas()
+
+
+def test_the_value_of_a_flight_inside_a_limit_is_not_the_planned_one_beyond_it() -> None:
+    """The planned path violates a zone by 38.5 m; the flight stays 21 m away from the violation: its depth is 0."""
+    place = Place("inclusion", 0)
+    depths = {"planned": 38.5, "flown": 0.0, "limit": 0.0, "tolerance": 0.02, "margin": 21.0, "unit": "m"}
+    assert make_finding("fence", place, ok=True, reason="", **depths).value == 0.0
+    # The other way round, the flight violates the zone.
+    depths |= {"planned": 0.0, "flown": 38.5, "margin": -38.5}
+    assert make_finding("fence", place, ok=False, reason="", **depths).value == 38.5

@@ -286,7 +286,7 @@ def test_another_trim_throttle_than_the_models_is_explained(tmp_path: Path, stat
     model, kept = re.search(r"with (\d+) % throttle", readme), re.search(r"TRIM_THROTTLE (\d+)\n", parameters)
     assert model is not None
     assert kept is not None
-    is_explained = f"keeps the file's TRIM_THROTTLE {kept[1]}, although the model needs {model[1]} %" in readme
+    is_explained = f"does not meet the file's TRIM_THROTTLE {kept[1]}: it needs {model[1]} %" in readme
     assert is_explained is (model[1] != kept[1])
     assert is_explained or not stated
 

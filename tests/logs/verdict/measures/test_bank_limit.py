@@ -47,3 +47,22 @@ def test_the_lowest_bank_limit_is_named(
     setup = make_setup(scenario, replace(uav, autopilot=law, limits=limits), LOITER, 1)
     assert math.degrees(setup.max_bank) == pytest.approx(bank)
     assert bank_limit_text(setup) == f"{owner} bank limit of {bank:.0f}°"
+
+
+@pytest.mark.parametrize(
+    ("roll_limit", "text"),
+    [
+        (50.0, "the aircraft's bank limit of 35° (a guess: state --bank)"),
+        # The autopilot has the same limit, so that a higher limit of the aircraft would not help.
+        (35.0, "PX4's bank limit of 35°"),
+    ],
+)
+def test_a_guessed_limit_is_named_only_if_it_decides_alone(roll_limit: float, text: str) -> None:
+    scenario = scenario_with(None, in_file=True)
+    uav = load_uav(scenario)
+    law = Px4(Px4Parameters.defaults()).with_parameters(FW_R_LIM=roll_limit)
+    limits = replace(uav.limits, max_bank=min(uav.limits.max_bank, law.turns.max_bank))
+    setup = make_setup(scenario, replace(uav, autopilot=law, limits=limits), LOITER, 1)
+    guessed = replace(setup.limits.envelope, bank_guessed=True)
+    setup = replace(setup, limits=replace(setup.limits, envelope=guessed))
+    assert bank_limit_text(setup) == text

@@ -287,6 +287,18 @@ def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> 
     assert never.remaining_energy == pytest.approx(100.0 - 10.0 + min(one.energy_left for one in each))
 
 
+def test_a_return_that_hits_the_ground_after_its_loiter_does_not_leave_the_reserve(tmp_path: Path) -> None:
+    """Such a return has a time to its loiter and an energy, but does not arrive."""
+    setup = hill_setup(tmp_path, "[flight]\nbattery_wh = 100\n")
+    world = make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0)
+    found = judge_returns(world, planned_starts(setup, 4.0), 4.0)
+    first = found.each[0]
+    assert math.isfinite(first.time_to_loiter + first.energy_left)
+    crashed = replace(found, each=(replace(first, kind="ground"), *found.each[1:]))
+    assert (found.point_of_no_return.skipped_count, crashed.point_of_no_return.skipped_count) == (0, 1)
+    assert "every return that arrives leaves" in point_of_no_return_text(crashed)
+
+
 def test_more_wind_against_the_way_back_brings_it_nearer(tmp_path: Path) -> None:
     """The wind blows away from home: back it is slower, and takes longer."""
     away = []
