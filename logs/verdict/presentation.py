@@ -1,8 +1,7 @@
 """Define how findings are shown: their signs, words and numbers, and their order by rule.
 
-A verdict has four renderings, which read their texts here and in `logs.verdict.verdict.Verdict`: the document
-(``verdict.json``, and the list of the studio), lines of text (terminal), tables of HTML (report and notebook), and
-JUnit XML.
+The outputs read their texts here and in `logs.verdict.verdict.Verdict`: the document (``verdict.json``, and the list of
+the studio), lines of text (terminal), tables of HTML (report and notebook), JUnit XML, and the studio's map.
 """
 
 from collections import Counter

@@ -12,8 +12,8 @@ def bank_limit_text(setup: FlightSetup) -> str:
     """Return a text on a setup's bank limit and its source, such as "the aircraft's bank limit of 29°".
 
     The source is the aircraft, the autopilot or the scenario: the first one that has this limit.  If none has it, the
-    text names no source: "a bank limit of 29°".  A guessed limit of the aircraft is marked as a guess, and is named only
-    if the autopilot and the scenario do not have the same limit.
+    text names no source: "a bank limit of 29°".  A guessed limit of the aircraft is marked as a guess.  It is named
+    only if neither the autopilot nor the scenario has the same limit.
 
     >>> from logs.recording.example_log import example_log
     >>> bank_limit_text(example_log().setup)

@@ -50,7 +50,8 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
     assert "engine out: home can be reached from" in out
-    assert "point of no return by energy: none, because every return leaves the reserve of" in out
+    assert "point of no return by energy: none, because every return that arrives leaves the reserve of" in out
+    assert "; 1 return that does not arrive is left out" in out
     assert "which contains no trees, houses or water" in out
     glides = answer["engine_out"]
     assert sum(glides[kind] for kind in ("home", "site", "flat", "nothing", "unknown")) == 13
