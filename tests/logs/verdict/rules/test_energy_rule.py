@@ -75,8 +75,8 @@ def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, acti
     needed, _ = predicted_energy(route_requirements(setup))
     charge = 1000.0 * needed / setup.envelope.volts
     text = f"BATT_CAPACITY {share * charge + 1500.0:.1f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT {action}\n"
-    # The second failsafe acts 1,400 mAh later.
-    for later in ("", "BATT_CRT_MAH 100\nBATT_FS_CRT_ACT 1\n"):
+    # The second failsafe acts 100 mAh later.
+    for later in ("", "BATT_CRT_MAH 1400\nBATT_FS_CRT_ACT 1\n"):
         law = ArduPlane(ArduPilotParameters.from_text(text + later, "mine.param"))
         item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
         assert item.ok is ok
