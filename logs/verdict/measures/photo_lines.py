@@ -209,6 +209,14 @@ def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, 
     return tuple((float(start), float(end)) for start, end in zip(edges[::2], edges[1::2], strict=True))
 
 
+def line_distances(axis: LineAxis) -> Floats:
+    """Return the distances along a planned photo line at which it is judged, m, (n,): both ends, and steps between.
+
+    A step is at most `PHOTO_STEP_M`.
+    """
+    return np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
+
+
 def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
     """Return the heights of positions (n, 3) above ground, m, (n,); NaN where the ground is unknown.
 
@@ -581,7 +589,7 @@ def _line_strip(
     """
     if aligned is None:
         axis = LineAxis(requirements.points[line.first : line.last + 1])
-        along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
+        along = line_distances(axis)
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
         positions, speeds = axis.points_at(along), requirements.ground_speed[legs]
         heights = heights_over_ground(requirements, positions)

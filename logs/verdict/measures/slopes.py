@@ -122,12 +122,10 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         )
         indices = np.array([np.argmin(np.abs(distance_along - midpoint))])
     first, last = rows.start + int(indices[0]), rows.start + int(indices[-1])
-    if aligned.track.time[last] - aligned.track.time[first] < 1.0:
-        rows_around = aligned.rows_around(first, last, 0.5)
-        first, last = rows_around.start, rows_around.stop - 1
+    margin = 0.5 if aligned.track.time[last] - aligned.track.time[first] < 1.0 else 0.0
     # The course column is unwrapped, so a full circle shows as a course change of 360 degrees.
     return LegFit(
-        float(aligned.course[first : last + 1].mean()),
+        float(aligned.course[aligned.rows_around(first, last, margin)].mean()),
         ROUGH_COURSE_ERROR_RAD,
         float(np.ptp(distance_along)),
         is_fitted=False,

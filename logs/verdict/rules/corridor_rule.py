@@ -48,11 +48,11 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         leg_rows, ground = aligned.leg_rows(leg), requirements.ground_phases
         rows = leg_rows
         if ground is not None and ground.procedures.take_off is not None and ground.procedures.take_off.waypoint == leg:
-            course_error = np.abs(np.sin(0.5 * (aligned.course[leg_rows] - requirements.courses[leg])))
+            course_error = aligned.course[leg_rows] - requirements.courses[leg]
             lateral_offset = project_onto_leg(
                 requirements, leg, np.asarray(aligned.track.position[leg_rows], dtype=np.float64)
             )[1]
-            has_joined = (course_error < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (
+            has_joined = (np.cos(course_error) > math.cos(RUNWAY_COURSE_TOLERANCE_RAD)) & (
                 np.abs(lateral_offset) <= limit
             )
             rows = slice(leg_rows.start + int(np.argmax(has_joined)), leg_rows.stop) if has_joined.any() else leg_rows

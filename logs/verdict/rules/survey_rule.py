@@ -26,6 +26,7 @@ from logs.verdict.measures.photo_lines import (
     OverlapMeasure,
     heights_over_ground,
     is_covered,
+    line_distances,
     measure_line,
     measure_overlap,
     planned_switch_radius,
@@ -42,7 +43,6 @@ from logs.verdict.tolerances import (
     PHOTO_COVERAGE_FRACTION,
     PHOTO_HEIGHT_FRACTION,
     PHOTO_OVERLAP_TOLERANCE,
-    PHOTO_STEP_M,
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
@@ -277,10 +277,8 @@ def _planned_finding(
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     # Fraction of the line whose height above ground is unknown.
     axis = LineAxis(requirements.points[line.first : line.last + 1])
-    along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
-    unknown_fraction = min(
-        float(np.isnan(heights_over_ground(requirements, axis.points_at(along))).mean()), straight_fraction
-    )
+    heights = heights_over_ground(requirements, axis.points_at(line_distances(axis)))
+    unknown_fraction = min(float(np.isnan(heights).mean()), straight_fraction)
     ok = is_covered(straight_fraction - unknown_fraction, unknown_fraction)
     name = _line_text(requirements, survey, line, number)
     faults, facts = [], [f"{name}: its turns leave {100.0 * straight_fraction:.0f} % of its {length:.0f} m straight"]

@@ -87,6 +87,12 @@ def test_the_way_without_a_corner_has_to_have_room_for_its_own_turns() -> None:
         assert (negligible_kink_distance(requirements, 1) is not None) is room
 
 
+def test_a_way_without_a_corner_has_the_room_of_the_routes_first_leg() -> None:
+    """A right angle takes some 130 m of the first leg's 200 m, which has no turn at its begin."""
+    requirements = demands_of([[0, 0, 300], [0, 200, 300], [1000, 202, 300], [2000, 200, 300], [3000, 200, 300]])
+    assert negligible_kink_distance(requirements, 2) is not None
+
+
 def test_the_corners_of_a_circle_are_no_jog() -> None:
     requirements = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
     arcs = requirements.setup.route.arc_radii.copy()

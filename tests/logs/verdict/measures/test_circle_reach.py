@@ -11,6 +11,7 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.measures.circle_reach import _ring_points, end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, radius_at, sphere
+from world.terrain import make_gridded_terrain
 
 REACH = 261.0
 
@@ -21,20 +22,16 @@ def found(low: float, high: float, requirements: RouteRequirements | None = None
     return find_hazards(known, np.zeros(2), low, high, REACH)
 
 
+# Distance of the ground's pixels, m.
+PITCH = 20.0
+
+
 def with_ground(away: float, up: float) -> RouteRequirements:
     """Flat ground with a block of this height, m or NaN, wherever it is farther east than that, m."""
-    setup = loiter(TIME, {})
-    ground = setup.scenario.terrain
-    assert ground is not None
-    _, columns = np.indices(ground.heights.shape)
-    heights = np.array(ground.heights)
-    # The map from places to pixels, at two places on the axis: the raster's columns lead east.
-    record = ground.to_pixel
-    here, _ = record(np.array([away]), np.array([0.0]))
-    heights[columns > here[0]] = up
-    return route_requirements(
-        replace(setup, scenario=replace(setup.scenario, terrain=replace(ground, heights=heights)))
-    )
+    setup, axis = loiter(TIME, {}), np.arange(-4000.0, 4001.0, PITCH)
+    heights = np.tile(np.where(axis > away, up, 0.0), (axis.size, 1))
+    ground = make_gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
+    return route_requirements(replace(setup, scenario=replace(setup.scenario, terrain=ground)))
 
 
 def test_a_missions_end_has_circles_where_the_autopilot_flies_them() -> None:
@@ -71,11 +68,8 @@ def test_the_highest_height_counts_against_the_greatest_above_ground() -> None:
     ],
 )
 def test_a_hill_counts_within_its_reach_only(up: float, what: str) -> None:
-    ground = route_requirements(loiter(TIME, {})).setup.scenario.terrain
-    assert ground is not None
-    pitch = 2.0 * ground.spacing
-    assert found(500.0, 500.0, with_ground(REACH - pitch, up)) == [what]
-    assert found(500.0, 500.0, with_ground(REACH + pitch, up)) == []
+    assert found(500.0, 500.0, with_ground(REACH - 2.0 * PITCH, up)) == [what]
+    assert found(500.0, 500.0, with_ground(REACH + 2.0 * PITCH, up)) == []
 
 
 @pytest.mark.parametrize(("reach", "spacing", "rings"), [(900.0, 30.0, 30), (900.0, 90.0, 24), (9000.0, 30.0, 120)])

@@ -8,6 +8,7 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict.measures.route_progress import _sample_route
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from tests.logs.verdict.judging import failing, judge, of, waypoint
@@ -154,3 +155,14 @@ def test_a_return_that_ends_on_its_way_home_is_not_passed() -> None:
         aligned = align_track(route_requirements(setup), track.rows(0, row + 1))
         assert aligned is not None
         assert bool(aligned.passed[-1]) is is_passed
+
+
+def test_a_loiter_is_one_place_at_its_center() -> None:
+    """Two turns of 100 m around a place, and the margin of 60 m."""
+    lines = (wp(-1000, 1500, 300), wp(500, 1500, 300, command=18, p="2 0 100 0"), wp(2500, 1500, 300))
+    route = by_arduplane(setup_of(*lines, home="36.5 -84.2 100")).route
+    samples = _sample_route(route, 50.0)
+    places = np.unique(samples.sample_of_waypoint[route.arc_radii > 0.0])
+    assert places.size == 1
+    assert samples.positions[places[0]] == pytest.approx([500.0, 1500.0], abs=15.0)
+    assert samples.radii[places[0]] == pytest.approx(160.0, abs=20.0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aircraft.path_limits import BLEND_ACCELERATION, ROLL_TIME
+from aircraft.path_limits import ROLL_TIME
 from flight.mission.items import Command, Frame, MissionItem
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
@@ -247,9 +247,13 @@ def test_an_apex_of_a_corner_without_room_has_the_slopes_of_its_shorter_leg() ->
     assert apex[2] == pytest.approx(300.0 + 0.5 * 40.0 * 0.1, abs=1e-6)
 
 
-def test_a_slopes_blend_is_a_parabola_about_the_waypoint_or_about_each_end_of_its_arc() -> None:
+@pytest.mark.parametrize("acceleration", [1.0, 3.0])
+def test_a_slopes_blend_is_a_parabola_about_the_waypoint_or_about_each_end_of_its_arc(
+    acceleration: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of v^2 / (2 a) times the change of slope, at the highest ground speed: 25 + 5 m/s."""
-    parabola = 30.0**2 / (2.0 * BLEND_ACCELERATION)
+    monkeypatch.setattr("logs.verdict.measures.route_requirements.BLEND_ACCELERATION", acceleration)
+    parabola = 30.0**2 / (2.0 * acceleration)
     wind = {"speed_mps": 5.0, "from_deg": 180.0}
     straight = make_setup([[0, 0, 300], [0, 2000, 380], [0, 4000, 340]], wind=wind)
     assert route_requirements(straight).blend.tolist() == pytest.approx([0.0, 0.06 * parabola, 0.0])

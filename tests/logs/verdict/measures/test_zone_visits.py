@@ -195,6 +195,19 @@ def test_unknown_ground_is_not_judged() -> None:
         assert (beside.unknown, beside.depth) == (False, pytest.approx(-30.0, abs=0.011))
 
 
+@pytest.mark.parametrize(("begin", "course"), [(-100.0, 90.0), (350.0, 270.0)])
+def test_a_violation_over_known_ground_is_found_on_a_way_with_one_end_over_unknown_ground(
+    begin: float, course: float
+) -> None:
+    """A ridge of 40 m at east 200 m lifts a ceiling of 100 m to 140 m; east of 300 m the ground is unknown."""
+    axis = np.arange(-200.0, 601.0, 10.0)
+    heights = np.where(axis > 300.0, np.nan, np.where(axis == 200.0, 40.0, 0.0))
+    ground = make_gridded_terrain(np.tile(heights, (axis.size, 1)), axis, axis, source="", sha256="", datum="")
+    way = [move(begin, 100.0, 130.0, course=course, length=450.0)]
+    found = visit(way, box(ceiling=ZoneLevel(100.0, "ground")), ground)
+    assert (found.depth, found.unknown) == (pytest.approx(10.0, abs=0.011), True)
+
+
 def test_of_many_zones_each_is_judged_by_itself() -> None:
     rng = np.random.default_rng(3)
     zones = [

@@ -59,6 +59,15 @@ def test_prediction_and_flight_agree() -> None:
     assert "; predicted: " in item.reason
 
 
+@pytest.mark.parametrize(("stop", "is_cut_short"), [(None, False), (4000.0, True)])
+def test_a_flight_that_was_cut_short_is_compared_with_the_energy_of_the_whole_mission(
+    stop: float | None, is_cut_short: bool
+) -> None:
+    setup = real_setup()
+    item = of(judge(setup, fly_path(setup, stop=stop)), "energy")
+    assert ("Wh for the whole mission" in item.reason) is is_cut_short
+
+
 @pytest.mark.parametrize(("share", "action", "ok"), [(1.01, 1, True), (0.99, 1, False), (0.99, 0, True)])
 def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, action: int, ok: bool) -> None:
     """BATT_LOW_MAH remains of BATT_CAPACITY (`AP_BattMonitor_Backend::update_failsafes`); 0 does nothing."""
@@ -66,10 +75,25 @@ def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, acti
     needed, _ = predicted_energy(route_requirements(setup))
     charge = 1000.0 * needed / setup.envelope.volts
     text = f"BATT_CAPACITY {share * charge + 1500.0:.1f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT {action}\n"
+    # The second failsafe acts 100 mAh later.
+    for later in ("", "BATT_CRT_MAH 1400\nBATT_FS_CRT_ACT 1\n"):
+        law = ArduPlane(ArduPilotParameters.from_text(text + later, "mine.param"))
+        item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
+        assert item.ok is ok
+        assert (", but the flight needs" in item.reason) is not ok
+        if action:
+            assert item.limit == pytest.approx(share * needed, rel=1e-4)
+
+
+@pytest.mark.parametrize(("share", "source"), [(0.99, "autopilot"), (1.01, "aircraft")])
+def test_a_failsafe_that_acts_after_the_reserve_is_reached_is_no_limit(share: float, source: str) -> None:
+    setup = real_setup()
+    reserve_charge = 1000.0 * 0.8 * setup.battery / setup.envelope.volts
+    text = f"BATT_CAPACITY {share * reserve_charge + 1500.0:.1f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n"
     law = ArduPlane(ArduPilotParameters.from_text(text, "mine.param"))
     item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
-    assert item.ok is ok
-    assert (", but the flight needs" in item.reason) is not ok
+    assert item.limit_source == source
+    assert item.limit == pytest.approx(min(share, 1.0) * 0.8 * setup.battery, rel=1e-4)
 
 
 def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judged() -> None:

@@ -223,7 +223,8 @@ def test_a_return_whose_circle_is_wider_than_the_arrival_radius_comes_to_its_end
 
 
 @pytest.mark.parametrize(
-    ("seconds", "radius", "arrived"), [(0.0, 0.0, True), (-30.0, 0.0, False), (-70.0, 500.0, False)]
+    ("seconds", "radius", "arrived"),
+    [(0.0, 0.0, True), (-30.0, 0.0, False), (-70.0, 500.0, False), (-50.0, 500.0, False)],
 )
 def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: float, arrived: bool) -> None:
     # Of an imported flight nobody knows how it ended but by its rows.  Around 500 m it flies for two minutes and more.

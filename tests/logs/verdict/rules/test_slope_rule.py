@@ -247,6 +247,10 @@ def test_a_vertical_leg_is_flown_on_the_next_leg(
         assert item.ok is (False if slope is None else None if is_open else True)
         vertical = math.copysign(math.degrees(math.atan2(abs(rise), 0.1)), rise)
         assert item.planned == pytest.approx(vertical if slope is None else slope, abs=0.01)
+        if slope is not None:
+            assert item.margin is not None
+            # The margin is the distance to the limit, which is in the slope's direction.
+            assert item.limit == pytest.approx(slope + math.copysign(item.margin, slope), abs=0.01)
 
 
 def test_a_staircase_is_as_high_as_its_stairs_together() -> None:

@@ -20,6 +20,7 @@ def facts(flight: str) -> dict[str, float]:
 def test_where_it_touches_down_is_measured_along_and_across_the_landing() -> None:
     flown = flown_circuit()
     one = found(flown.setup, flown.track, "touchdown")
+    assert (one.place.kind, one.place.item) == ("waypoint", flown.setup.mission.items[-1].seq)
     known = {fact.what: fact.value for fact in one.facts}
     track, terrain = flown.track, flown.setup.scenario.terrain
     assert terrain is not None

@@ -189,6 +189,17 @@ def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool
     ) is not ok
 
 
+@pytest.mark.parametrize(("aside", "ok"), [(50.0, True), (70.0, False)])
+def test_past_the_line_of_the_last_waypoint_counts_for_arduplane_within_the_corridor(aside: float, ok: bool) -> None:
+    stated = make_setup(STRAIGHT, limits={"corridor_m": 60.0})
+    setup = replace(accepting(stated, 10.0), autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    north = STRAIGHT[-1][1]
+    longer = make_setup([*STRAIGHT[:-1], [0, north + 500.0, STRAIGHT[-1][2]]])
+    item = of(judge(setup, fly_path(longer, across=bump(north, aside, 150.0))), "waypoint", waypoint(2))
+    assert item.ok is ok
+    assert f"the line across the leg at the waypoint was crossed {aside:.0f} m to the side" in item.reason
+
+
 def test_past_the_line_beside_it_there_is_no_margin() -> None:
     setup = replace(accepting(make_setup(STRAIGHT), 10.0), autopilot=ArduPlane(ArduPilotParameters.defaults()))
     for aside, margin in ((50.0, None), (4.0, 6.0)):

@@ -46,6 +46,18 @@ def test_ten_metres_of_a_runway_are_left_where_the_aircraft_leaves_it(left: floa
         assert one.brief == f"leaves the ground {away:.0f} m from home"
 
 
+def test_the_height_over_a_runway_counts_from_the_height_that_a_climb_out_needs() -> None:
+    """It stands 0.2 m high, and 2.5 m more than the 2 m needed are beyond doubt: 4.7 m."""
+    flown = flown_circuit()
+    position = np.array(flown.track.position)
+    row = int(np.argmax(position[:, 0] > 100.0))
+    position[:row, 2] = 0.2
+    position[row : row + 200, 2] = np.linspace(0.2, float(position[row + 200, 2]), 200)
+    runway = Launch("runway", math.radians(90.0), length=1000.0)
+    one = found(circuit(runway, STRIP), replace(flown.track, position=position), "launch")
+    assert one.flown == pytest.approx(4.7, abs=0.2)
+
+
 @pytest.mark.parametrize(("up", "ok"), [(4.52, True), (4.48, None), (2.02, None), (1.98, False)])
 def test_beyond_fifty_metres_of_way_two_metres_are_left_and_two_and_a_half_more_to_be_sure(
     up: float, ok: bool | None

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Home
+from flight.mission.surveys import LineAxis
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.photo_lines import LineMeasure, _line_steps, heights_over_ground
+from logs.verdict.measures import photo_lines
+from logs.verdict.measures.photo_lines import LineMeasure, _line_steps, heights_over_ground, line_distances
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.survey_rule import _is_too_tight, unusable_parts_text
 from tests.logs.verdict.judging import judge
@@ -32,6 +34,17 @@ def test_a_line_is_looked_at_metre_by_metre() -> None:
     along = np.arange(0.0, 12.25, 0.25)
     taken = _line_steps(along, along <= 7.0, 12.0)
     assert (len(taken), np.count_nonzero(taken)) == (12, 7)
+
+
+@pytest.mark.parametrize(
+    ("length", "step", "count"), [(12.0, 1.0, 13), (12.1, 1.0, 14), (12.0, 4.0, 4), (0.5, 1.0, 2), (0.0, 1.0, 2)]
+)
+def test_a_planned_line_is_judged_in_steps_from_end_to_end(
+    length: float, step: float, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(photo_lines, "PHOTO_STEP_M", step)
+    along = line_distances(LineAxis(np.array([[0.0, 0.0], [0.0, length]])))
+    assert along == pytest.approx(length * np.arange(count) / (count - 1))
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.0049, ""), (0.0051, "1 % with the camera off")])
