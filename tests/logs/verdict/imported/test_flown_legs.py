@@ -79,14 +79,14 @@ def test_another_place_is_farther_than_a_kilometre(beside: float, kind: str | No
     # The flight's nearest is its first leg, on the line north = 0.
     north = -(PLAN_MISMATCH_DISTANCE_M + beside)
     found = plan_mismatch(along([[-500.0, north, 200.0], [-200.0, north, 200.0], [0.0, north, 200.0]]), LOG.track)
-    assert (None if found is None else found.kind) == kind
+    assert (None if found is None else found.reason) == kind
 
 
 def test_the_same_places_the_other_way_round() -> None:
     way = [[300.0, 75.0, 215.0], [100.0, 25.0, 205.0], [-100.0, 0.0, 200.0], [-300.0, 0.0, 200.0]]
     found = plan_mismatch(along(way), LOG.track)
     assert found is not None
-    assert (found.kind, found.order) == ("order", (3, 2, 1, 0))
+    assert (found.reason, found.order) == ("order", (3, 2, 1, 0))
     assert found.text == "the flight passed its items in another order: 3, 2, 1, 0, ..."
     assert plan_mismatch(along(way[::-1]), LOG.track) is None
 
@@ -104,7 +104,7 @@ def test_a_waypoint_is_passed_within_the_corridor_but_50_to_150_m(
     limits = scenario.limits.model_copy(update={"corridor_m": corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
     found = plan_mismatch(along(way).in_scenario(replace(scenario, spec=spec, limits=limits)), LOG.track)
-    assert (None if found is None else found.kind) == kind
+    assert (None if found is None else found.reason) == kind
 
 
 @pytest.mark.parametrize(("in_order", "kind"), [(8, None), (7, "order")])
@@ -113,7 +113,7 @@ def test_four_fifths_of_the_passed_waypoints_are_in_the_plans_order(in_order: in
     last = [[400.0 - 20.0 * k, 100.0 - 5.0 * k, 200.0] for k in range(10 - in_order)]
     way = [*last, *([-480.0 + 50.0 * k, 0.0, 200.0] for k in range(in_order))]
     found = plan_mismatch(along(way), LOG.track)
-    assert (None if found is None else found.kind) == kind
+    assert (None if found is None else found.reason) == kind
 
 
 def test_a_flight_that_went_home_half_way_is_not_another_plan() -> None:
