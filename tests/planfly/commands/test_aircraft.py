@@ -287,7 +287,7 @@ def test_a_climb_at_the_throttle_limit_that_the_model_cannot_have_is_told(capsys
     assert main(["aircraft", "--new", "./foam", *SIX, "--top", "25", "--params", "own.parm"]) == 0
     told = "does not meet the file's TECS_CLMB_MAX 4 m/s: it climbs "
     for words in (capsys.readouterr().out, Path("foam/README.md").read_text()):
-        assert re.search(told + r"-?[0-3]\.\d m/s at THR_MAX 75\.\n", words)
+        assert re.search(told + r"-?[0-3]\.\d m/s at THR_MAX 75\. `ardupilot\.parm` keeps the file's value\.\n", words)
 
 
 @pytest.mark.parametrize("sink", [1.2, 0.72])
