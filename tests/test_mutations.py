@@ -5,9 +5,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from logs.verdict import tolerances
 from tests.mutations.choice import chosen_mutants
 from tests.mutations.covering import covering_tests, kernels_on
-from tests.mutations.generated import EFFORTS, limit_mutants
+from tests.mutations.generated import BY_ORDERS, EFFORTS, limit_mutants
 from tests.mutations.listed import listed_mutants
 from tests.mutations.mutant import ROOT, replacing
 from tests.soak import some
@@ -32,6 +33,11 @@ def test_every_limit_is_tried_larger_and_smaller_but_where_more_costs_time_alone
     assert len(found) == len(set(found))
     larger, smaller = ({start for start, sign in found if sign in signs} for signs in ("*+", "/-"))
     assert len(larger ^ smaller) == sum(len(signs) == 1 for signs in EFFORTS.values())
+
+
+@pytest.mark.parametrize("name", [*BY_ORDERS, *EFFORTS])
+def test_a_limit_that_is_changed_in_its_own_way_exists(name: str) -> None:
+    assert hasattr(tolerances, name)
 
 
 def test_two_hundred_of_them_are_the_same_each_time_and_of_all_rooms() -> None:

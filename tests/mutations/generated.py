@@ -12,7 +12,15 @@ LIMITS = "logs/verdict/tolerances.py"
 STEP = 1.3
 # Of bounds on garbage, condition numbers and rounding only the order of magnitude matters.
 ORDERS = 1000.0
-BY_ORDERS = ("FARTHEST", "FASTEST", "MAX_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CHORD_TIME", "FAR")
+BY_ORDERS = (
+    "MAX_PLAUSIBLE_POSITION_M",
+    "MAX_PLAUSIBLE_SPEED_MPS",
+    "MAX_PLAUSIBLE_VALUE",
+    "SPHERE_STAY_TOLERANCE_S",
+    "U_TURN_RAD",
+    "CHORD_TIME_S",
+    "SPHERE_FAR_DIAGONALS",
+)
 # Numbers that decide how much is computed, where more costs nothing but time: how each is changed.
 EFFORTS = {"CHORD_TIME_S": "*", "SPHERE_FAR_DIAGONALS": "/", "SUGGESTION_TRIAL_COUNT": ""}
 
