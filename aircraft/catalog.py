@@ -300,8 +300,8 @@ def copy_aircraft_folder(
 
     folder: the new folder.
     source: the aircraft to copy.
-    model: contents of the model's files by name, for a model that JSBSim ships, which are copied as well; None to refer
-        to that model only.
+    model: files of a model that JSBSim ships, as contents by name, to be written to the new folder as well; None to let
+        the copy refer to JSBSim's own files.
     overwrite: True to replace the folder of an aircraft.
 
     Returns the sorted names of the created files. Raises FlightError as `check_new_folder` does, and OSError if the

@@ -272,13 +272,13 @@ def fit_parameters(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, without the shifts from fixed quantities.
+    """Estimate all parameters from aligned signals, as if the quantities that are held fixed had no errors.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
-    level: error of the level of the autopilot, rad.
+    level: levelling error of the autopilot (error of its pitch reference), rad.
     dynamics: True to estimate the moments as well.
-    nominal: refinement of an earlier estimate, whose values are only adjusted (to first order) to the changed signals
-        and parameters; None to refine the moments.
+    nominal: moment refinement of an earlier estimate, which is updated to first order for the changed signals and
+        parameters; None to refine the moments in full.
     """
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}

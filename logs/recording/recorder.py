@@ -356,7 +356,9 @@ class Recorder:
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
-        """Write the pending rows and events before a log time in chunks of at most one second, and flush the file.
+        """Write the pending rows and events that are earlier than a log time, and flush the file.
+
+        The messages are written in chunks of at most one second.
 
         end_ns: log time, ns; None to write all.
         """

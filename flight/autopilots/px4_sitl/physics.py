@@ -366,7 +366,7 @@ class HilLockstep(Lockstep):
                 self.step_on_rail(rail)
 
     def _next_commands(self) -> Commands:
-        """Return the commands in PX4's answer to the first step of the last frame, without waiting."""
+        """Return the commands from the latest outputs that PX4 has sent (first step of the last frame); do not wait."""
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.value_at_fraction(outputs[ELEVATOR]),

@@ -115,7 +115,7 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
-    """Collect what a drawing of the returns to launch shows: the worst paths and the lowest safe altitudes.
+    """Collect the data for a drawing of the returns to launch: the worst paths and the lowest safe altitudes.
 
     starts: places on the route from which the returns were simulated; they are ignored if `returns` is empty.
     glides: glides after an engine failure, if they were simulated.
@@ -125,7 +125,7 @@ def drawn_returns(
 
 
 def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Collect what a quick drawing of the returns to launch shows: the worst paths only.
+    """Collect the data for a quick drawing of the returns to launch: the worst paths only.
 
     Glides and lowest safe altitudes, which take the most time, are left out.
     """

@@ -392,7 +392,7 @@ class ReturnWorld:
 
     @property
     def ending(self) -> Ending:
-        """Ending of an RTL: a loiter, or a landing sequence by one of two ways."""
+        """Ending of an RTL: a loiter, or a landing sequence that is joined from the loiter or straight."""
         ending_by_join: dict[str, Ending] = {"circle": "on to land", "straight": "straight to land"}
         return ending_by_join.get(self.autopilot.returns.rules.landing_join, "circle") if self.landings else "circle"
 

@@ -49,10 +49,13 @@ def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that the planned path or the flight touches; return [] without zones.
+    """Return one finding for each zone that the planned path or the flight touches; [] if there are no zones.
 
-    If no zone is violated, a finding before these states this.  A fence that cannot be converted to zones has an
-    unjudged finding.
+    If no zone is violated, the first finding states this.  A fence that cannot be converted to zones yields a finding
+    that is not judged.
+
+    aligned: the flight; None if nothing was flown.
+    geometric: True to judge the planned path only.
     """
     airspace = requirements.airspace
     findings = []

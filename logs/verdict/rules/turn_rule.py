@@ -125,10 +125,10 @@ def _turn_finding(
 def _judge_planned_turn(
     requirements: RouteRequirements, waypoint: int, limit: float, source: str
 ) -> tuple[list[Message], list[str], str, float | None]:
-    """Judge the planned turn at a waypoint by its limit (rad).
+    """Compare the planned turn at a waypoint with its limit (rad).
 
-    Return faults, texts on the turn, a check (`UNKNOWN_AIRCRAFT` or ""), and the planned turn, rad.  A negligible kink
-    is no fault, and its turn is returned as None.
+    Return the faults, texts that describe the turn, `UNKNOWN_AIRCRAFT` if the limit is not known and "" otherwise, and
+    the planned turn, rad.  A negligible kink is no fault, and its turn is returned as None.
 
     source: source of the limit: "scenario" or "aircraft".
     """

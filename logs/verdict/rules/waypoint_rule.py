@@ -43,7 +43,7 @@ def waypoint_findings(
 def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
     """Judge whether the fly-by arc passes within the acceptance radius of its waypoint.
 
-    A waypoint that is flown over, or whose autopilot flies no fly-by arcs, passes.
+    A waypoint that is flown over passes.  If the autopilot does not fly fly-by arcs, all waypoints pass.
     """
     limit, source = acceptance_limit(requirements, waypoint)
     offset = float(requirements.fly_by_offset[waypoint])

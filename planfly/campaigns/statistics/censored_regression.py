@@ -447,10 +447,11 @@ class _Posterior:
         return np.where(is_possible, log_densities, -np.inf)
 
     def sample(self, mode: Floats) -> Floats:
-        """Return equally likely coefficients of the terms, (s, size), by importance sampling around the mode.
+        """Draw s equally likely sets of coefficients, (s, size), by importance sampling around the mode.
 
         With few failures, the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
-        Therefore the sampling replaces the constant by the predictor in the wind at which the predictor is known best.
+        Therefore the constant is not drawn itself: the value of the predictor is drawn at the wind speed at which it is
+        known best, and the constant is computed from it.
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
         covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
