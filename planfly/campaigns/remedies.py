@@ -38,6 +38,8 @@ def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
 def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) -> list[str]:
     """Return texts on the changes that would help against the failures of a rule; [] if none is known.
 
+    For a rule whose margin is a length, the text states by how much to change it, if the margin is known.
+
     low_margin: margin that 5 % of the flights fall below, m; None if it is unknown.
     """
     shortfall = 0.0 if low_margin is None else max(0.0, -low_margin)
