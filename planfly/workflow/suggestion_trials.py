@@ -74,7 +74,7 @@ def never_abort() -> bool:
 
 @dataclass(eq=False)
 class Trial:
-    """A setup that is judged and flown when a verdict is first requested, and only once.
+    """A setup that is judged, and flown if needed, only once: when a verdict is first requested.
 
     should_abort: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
     """
@@ -90,7 +90,7 @@ class Trial:
 
     @cached_property
     def geometry_verdict(self) -> Verdict:
-        """Verdict without a flight."""
+        """Verdict by geometry, without a flight."""
         return judge_geometry(self.setup, self.requirements)
 
     @cached_property
@@ -111,12 +111,12 @@ class Trial:
 
     @cached_property
     def flight_verdict(self) -> Verdict:
-        """Verdict on the flight."""
+        """Verdict on the flight, which is flown for it."""
         return judge_flight(self.setup, *self.flight, requirements=self.requirements)
 
 
 def max_explaining_flights(setup: FlightSetup) -> int:
-    """Return the number of flights, reference and trial flights, that may explain a setup's verdict.
+    """Return how many flights, reference and trial flights together, may be flown to explain a setup's verdict.
 
     >>> from logs.recording.example_log import example_log
     >>> max_explaining_flights(example_log().setup) > 100
@@ -180,7 +180,7 @@ def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
 
 
 def _worst_findings(verdict: Verdict) -> dict[tuple[str, str, int | None, str], Finding]:
-    """Return the worst finding of each rule at each place of a verdict."""
+    """Return the worst finding of each rule at each place of a verdict, by `finding_key`."""
     worst_by_key: dict[tuple[str, str, int | None, str], Finding] = {}
     for finding in sorted(verdict.findings, key=worst_first_key):
         worst_by_key.setdefault(finding_key(finding), finding)
@@ -193,7 +193,7 @@ def _is_undecided(finding: Finding) -> bool:
 
 
 def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
-    """Return the findings that fail or are undecided only after a change, each with the old finding.
+    """Return the findings that fail or are undecided after a change but not before, each as (old finding, finding).
 
     The old finding is None if there was none.  A finding that passed before and is not judged after the change is
     included.
@@ -216,7 +216,7 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
 
 
 def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
-    """Return the findings that a change makes worse: they fail, or are no longer decided or judged.
+    """Return the findings that a change makes worse: they newly fail, or are no longer decided or judged.
 
     A finding that was not judged before, because the flight ended early, is left out.
     """
@@ -230,7 +230,7 @@ def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Findin
 
 
 def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
-    """Return the findings of a changed mission that the verdict before the change does not name.
+    """Return the open findings of a changed mission that the change does not make worse.
 
     They fail or are undecided after the change.  Before it, they were not judged because the flight ended early, or
     they failed and are now only undecided.
@@ -244,7 +244,7 @@ def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[Rema
 
 
 def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a finding does not fail after a change, and the change makes no other finding fail."""
+    """Return True if a finding does not fail after a change, and no finding newly fails."""
     has_new_failures = any(added.ok is False for added in worsened_findings(old_verdict, new_verdict))
     return not has_new_failures and finding_key(finding) not in map(finding_key, new_verdict.failed)
 
@@ -279,7 +279,7 @@ class PassedTrial:
 
 
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
-    """Return the suggestions that passed, grouped by finding, the smallest moves of items first.
+    """Return the suggestions that passed, grouped by finding, those with the smallest moves of items first.
 
     A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller one passed, and is stated first otherwise.
     """
@@ -360,7 +360,7 @@ class SuggestionTrials:
     def find_passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second and so on; return those that pass.
 
-        A suggestion is left out if a part of its changes passes by itself. Its moves are the fewest that are enough.
+        A suggestion is left out if some of its changes pass without the others.  It has only as many moves as it needs.
         """
         # The failed findings with suggestions, the worst of each rule first, the most urgent rules first; none if the
         # mission has too many legs or too many such findings.
@@ -393,7 +393,7 @@ class SuggestionTrials:
         ]
 
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
-        """Try a suggestion of a finding, enlarged if necessary; return the passed trial, or None.
+        """Try a suggestion of a finding, enlarged if necessary; return the trial that passed, or None.
 
         number: index of the suggestion among those of the finding.
         """
@@ -402,7 +402,10 @@ class SuggestionTrials:
     def _first_passing(
         self, finding: Finding, candidates: Iterator[tuple[Suggestion, Trial]], max_count: int
     ) -> PassedTrial | None:
-        """Return the first of at most `max_count` candidates whose trial passes, or None."""
+        """Return the first candidate whose trial passes, as a passed trial; None if none passes.
+
+        candidates: suggestions with their trials, of which at most `max_count` are tried.
+        """
         passed_candidate = first_that_passes(
             islice(candidates, max_count),
             lambda candidate: (
@@ -423,7 +426,10 @@ class SuggestionTrials:
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
 
     def _parts(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
-        """Yield the parts of a suggestion's moves, the smallest first, each with its trial."""
+        """Yield suggestions with only a part of a suggestion's moves, the fewest moves first, each with its trial.
+
+        Nothing is yielded for fewer than two moves, and for changes of other kinds than `_PART_KINDS`.
+        """
         moves, items = _item_moves(suggestion), self.judged.setup.route.items.tolist()
         if len(moves) < 2 or not {change.what for change in suggestion} <= _PART_KINDS:
             return
@@ -535,7 +541,7 @@ class SuggestionTrials:
         return with_value(least_change([*values, largest_value], passes) or largest_value)
 
     def _trial(self, finding: Finding, suggestion: Suggestion) -> Trial:
-        """Return the trial of a suggestion, the same one for equal missions and setups.
+        """Return the trial of a suggestion; suggestions that result in the same flight share a trial.
 
         Raises MissionError if the suggestion cannot be applied, and TrialAborted.
         """
@@ -621,9 +627,9 @@ def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, su
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
-    """Return a suggestion, increased by what the mission still needs after it; None if no increase is known.
+    """Return a suggestion enlarged by what the mission still needs after it; None if no enlargement is known.
 
-    If the finding still does not pass, the increase is what this finding needs. Otherwise it is what the other legs
+    If the finding still does not pass, the enlargement is what this finding needs. Otherwise it is what the other legs
     need for the same rule.
 
     verdict: verdict on the mission with the suggestion applied.
