@@ -289,7 +289,7 @@ MAX_WIND_GRADIENT = 0.05
 class GivenWind(NamedTuple):
     """Mean wind that replaces the scenario's wind.
 
-    speed: m/s.
+    speed: wind speed, m/s.
     from_deg: direction from which the wind blows, degrees.
     """
 

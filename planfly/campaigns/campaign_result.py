@@ -59,6 +59,7 @@ def winds_command_line(target: str, goal: WindsGoal, options: Mapping[str, objec
 def command_line(command: str, target: str, options: Mapping[str, object]) -> str:
     """Return a ``planfly`` command line with quoted options.
 
+    command, target: name of the command, and its positional argument.
     options: values by name.  True gives a flag, and a list repeats the option.  Options that are None, False or equal
         to their default are omitted.
 
@@ -92,7 +93,8 @@ MAX_FLIGHTS = 5000
 class CampaignResult:
     """Result of `planfly.campaign`.
 
-    columns: columns of the table of flights, (n,) each.
+    summary: probability, failures and deciding rules of the flights.
+    columns: columns of the table of flights by name, (n,) each.
     table: file of this table; None if it was not kept.
     """
 
@@ -117,7 +119,7 @@ class CampaignResult:
 
     @property
     def answer(self) -> Answer:
-        """Answer to the goal: the target is reached, missed, or undecided."""
+        """Answer to the goal: "reached", "missed" or "undecided"; "no target" without a target."""
         return self.summary.estimate.answer
 
     @property

@@ -157,7 +157,7 @@ class Dispersions:
     draws: Draws | None = None
 
     def without(self, names: tuple[str, ...]) -> "Dispersions":
-        """Return the dispersions without the named quantities."""
+        """Return the dispersions without the quantities that have one of the names."""
         return replace(self, varying=tuple(varying for varying in self.varying if varying.quantity.name not in names))
 
     def with_draws(self, draws: Draws) -> "Dispersions":
@@ -357,6 +357,7 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
 
     The flights are drawn as in `draw_flight`.  d is the number of varying quantities that have more than one value.
 
+    seed: seed of the campaign.
     start, stop: index of the first flight, and of the flight after the last.
 
     >>> from planfly.campaigns.dispersions import default_dispersions

@@ -50,7 +50,7 @@ _COMPLETED = "completed"
 
 @dataclass(frozen=True, slots=True)
 class BatteryGoal:
-    """Question of a search for a battery.
+    """Goal of a search for a battery.
 
     probability: probability with which the reserve is to be kept.
     confidence: confidence of the interval of the capacity.
@@ -205,7 +205,7 @@ class BatteryResult:
 
     capacity: smallest capacity that keeps the reserve with the probability, Wh; inf if no battery does, because returns
         do not arrive, or because the energy that it adds is needed for its own mass; NaN if it is unknown.
-    interval: its interval with the goal's confidence, Wh; its upper end is inf if there are too few flights.
+    interval: interval of `capacity` with the goal's confidence, Wh; its upper end is inf if there are too few flights.
     own_capacity: capacity of the aircraft's battery, Wh.
     is_guessed: True if the aircraft's model and the scenario state no capacity, so that `own_capacity` is only a guess.
     kept: number of flights in which the aircraft's own battery keeps the reserve, at the stated mass.

@@ -65,7 +65,7 @@ _COMPLETED = "completed"
 
 @dataclass(frozen=True, slots=True)
 class GroundRiskGoal:
-    """Question about the ground risk of a mission.
+    """Request for the ground risk of a mission.
 
     probability: fraction of the flights that the flight geography contains.
     flights: number of flights.
@@ -136,7 +136,7 @@ def fly_for_excursions(
     terrain = setup.scenario.terrain
     if len(flown_mission.track) < 2 or terrain is None:
         return row
-    times, positions, velocities = _sampled_flight(flown_mission.track)
+    times, positions, velocities = _sample_flight(flown_mission.track)
     paths = _return_paths(setup, flown_mission.track, interval, glide=glide)
     uav = varied.uav.aircraft
     # Positions of flight and returns, and ground velocities, (n, 3) each; a return is sampled at every
@@ -185,7 +185,7 @@ def fly_for_excursions(
     )
 
 
-def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
+def _sample_flight(track: Track) -> tuple[Floats, Floats, Floats]:
     """Sample a track every `_SAMPLE_INTERVAL_S`, and at its end; rows that are not finite are left out.
 
     Return times, s, (n,), positions, m, (n, 3), and ground velocities, m/s, (n, 3).
@@ -491,7 +491,7 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
     track = fly_to_end(Flight(setup, base.uav.aircraft)).track
     if len(track) < 2:
         raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
-    _, positions, _ = _sampled_flight(track)
+    _, positions, _ = _sample_flight(track)
     return shapely.MultiLineString([positions[:, :2], setup.route.positions[:, :2]]).simplify(0.1)
 
 

@@ -30,11 +30,13 @@ DEFAULT_SPAN = timedelta(hours=24)
 
 @dataclass(frozen=True, slots=True)
 class WindowGoal:
-    """Question of a search for a departure window.
+    """Goal of a search for a departure window.
+
+    A departure is open if its fraction of flyable flights is at least `probability`.
 
     departures: times of take-off, ascending.
     asked: requested time of take-off; None if any departure will do.
-    probability: probability of a flyable flight at which a departure is open.
+    probability: required probability of a flyable flight.
     flights: number of flights of each departure.
     zone: offset from UTC in which the user stated the times.
     """

@@ -556,14 +556,14 @@ class _ProgressReport:
         self._search, self._advance, self._rate = search, advance, FlightRate(stored_count)
 
     def report_start(self, flight_count: int) -> None:
-        """Report, before the first flight, the flights in the table and the minimum number of flights."""
+        """Report, before the first flight, the number of flights in the table and the minimum number of flights."""
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
             remark = f"{flight_count} of {count_text(total, 'flight')} at least"
             self._advance(float(flight_count), float(total), remark)
 
     def report_calm(self, flight_count: int) -> None:
-        """Report the flights in calm air after which a search ends."""
+        """Report the number of flights in calm air, if a search ends after them."""
         if self._advance is not None:
             text = f"{count_text(flight_count, 'flight')} in calm air, none of them flyable"
             self._advance(float(flight_count), float(flight_count), text)

@@ -332,7 +332,7 @@ def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str
 
 
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Return the rule and the place of each failed finding.
+    """Return the rule and the place of each failed finding of a verdict.
 
     If a flight without failed findings is not flyable, the undecided findings that prevent it are returned, or else the
     rule `completion`.
@@ -378,5 +378,9 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
 
 
 def make_lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
-    """Return the row of a flight with the outcome "lost", because it could not be flown."""
+    """Return the row of a flight with the outcome "lost", because it could not be flown.
+
+    index: index of the flight.
+    reason: reason for the end of the flight, such as `LOST_REASON`.
+    """
     return FlightRow(draw_flight(base.dispersions, base.seed, index), "lost", reason)

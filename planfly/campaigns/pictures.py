@@ -205,6 +205,7 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
     """Draw a tornado chart: the fraction of the deciding margin's variance that each quantity explains.
 
     A bar points to the right if an increase of the quantity increases the margin.
+    bars: the quantities, from top to bottom.
     rule_title: title of the rule with the deciding margin.
     """
     with clean_style():
@@ -512,7 +513,7 @@ def _draw_legend(
 ) -> None:
     """Draw the legend of the go/no-go chart, with entries only for what the chart shows.
 
-    target, confidence, wind: as in `draw_go_no_go`.
+    directions, target, confidence, wind: as in `draw_go_no_go`.
     open_edge: maximum wind of the search, m/s, if a judged boundary is beyond it, otherwise None.
     """
     from matplotlib.lines import Line2D

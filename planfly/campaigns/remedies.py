@@ -24,7 +24,9 @@ _HEIGHT_RULES = ("clearance", "approach", "climbout")
 
 
 def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
-    """Return changes that would raise the probability, for the most failed rules; () if no flight failed.
+    """Return texts on changes that would raise the probability, those for the most failed rule first.
+
+    () if no flight failed a rule.
 
     scenario: scenario of the mission.
     """

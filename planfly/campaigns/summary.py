@@ -135,10 +135,9 @@ class DecidingRule:
 class CampaignSummary:
     """Contents of the summary and the report.
 
-    deciding: rules that the most flights failed (ties included), the most urgent first.  If no flight failed a rule,
-        the
-    rule with the smallest reliability index: the mean of its margins divided by their standard deviation (Cornell, "A
-    probability-based structural code", ACI Journal 66, 1969).  () if no margin is known.
+    deciding: rules that the most flights failed (ties included), the most urgent first.  If no flight failed a rule, it
+        is the rule with the smallest reliability index: the mean of its margins divided by their standard deviation
+        (Cornell, "A probability-based structural code", ACI Journal 66, 1969).  () if no margin is known.
     conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
     deciding_flights: number of flights that would decide the target with the same fraction of flyable flights; None if
     the target is decided, or for more than `MAX_DECIDING_FLIGHTS`.

@@ -277,10 +277,7 @@ class LockedTable:
         report_line(f"{self.path}: {examination.describe()}")
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table contains more flights than requested.
-
-        The base class accepts any number.
-        """
+        """Raise StoreError if the table contains more flights than the settings request; here, accept any number."""
 
     def __enter__(self) -> Self:
         """Return the locked table."""
@@ -431,12 +428,13 @@ class Store(LockedTable):
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
         """Create the table, or open it to resume.
 
-        Raises StoreError if the table contains more flights than requested.
+        made_of, settings, resume: as for `LockedTable`.
+        Raises as `LockedTable`, and StoreError if the table contains more flights than requested.
         """
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table contains more flights than requested."""
+        """Raise StoreError if the table contains more flights than the settings request."""
         if (flight_count := self.tally().flown) > settings.get("flights", math.inf):
             reason = f"flights {settings['flights']}: the table already contains {count_text(flight_count, 'flight')}"
             raise StoreError(f"{self.path}: {reason}", file=self.path)
@@ -450,12 +448,12 @@ class Store(LockedTable):
         return dict(self._connection.execute("SELECT flight, outcome FROM flights ORDER BY flight"))
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """Return a column of numbers in the order of flights, (n,); a missing value is NaN."""
+        """Return a column of numbers by its name, in the order of flights, (n,); a missing value is NaN."""
         rows = self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")
         return np.fromiter((math.nan if value is None else value for (value,) in rows), dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
-        """Return a column of texts, in the order of flights."""
+        """Return a column of texts by its name, in the order of flights."""
         return [
             str(value)
             for (value,) in self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")

@@ -209,7 +209,10 @@ class _Probe:
         return self._evaluate_coefficients(0.0, rates=vector)
 
     def _differentiate(self, function: Callable[[float], Floats], step: float) -> Floats:
-        """Return the derivative of a function from a number to coefficients, at 0, by a central difference, (6,)."""
+        """Return the derivative at 0 of a function from a number to coefficients, (6,), by a central difference.
+
+        step: distance from 0 to either side.
+        """
         return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
     def _evaluate_coefficients(
@@ -327,7 +330,7 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
 
 
 def scale_base_model(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
-    """Return a model scaled to another mass, kg, span, m, and wing area, m^2.
+    """Return a model scaled to another mass (kg), span (m) and wing area (m^2).
 
     Inertia scales with mass and span squared.  The chord keeps its ratio to area / span.  Induced drag is CL^2 divided
     by pi, span efficiency and aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2); the efficiency, all

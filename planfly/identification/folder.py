@@ -349,6 +349,8 @@ def format_posterior(identified: Identified) -> str:
 def _format_quantity(name: str, unit: str, numbers: tuple[float, float, float, float, float], reason: str) -> list[str]:
     """Return the lines of a ``[[quantity]]`` table.
 
+    name: name of the quantity's property in the model.
+    unit: unit of the numbers.
     numbers: prior, standard deviation of the prior, estimate, standard deviation of the estimate, and the fraction of
         the prior variance that the logs removed.
     reason: sentence that says what the quantity is.

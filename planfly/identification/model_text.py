@@ -305,7 +305,12 @@ def _format_table_functions(motor: MotorTable) -> dict[str, str]:
           <tableData>\n{header}\n{rows}\n</tableData> </table>"""
 
     def format_scaled(values: Floats, factor: str, power: int) -> str:
-        """Return the XML product of a table, a factor, the density ratio and a power of the speed factor."""
+        """Return the XML product of a table, a factor, the density ratio and a power of the speed factor.
+
+        values: values of the table.
+        factor: XML of the factor.
+        power: exponent of the speed factor.
+        """
         return f"<product> {factor} {density_ratio} {power * speed} {format_table(values)} </product>"
 
     load = "<p> ident/propeller-torque </p>"

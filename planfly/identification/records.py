@@ -356,9 +356,11 @@ def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _read_pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return the minimum, trim and maximum pulse (us) and the sign of an output.
+    """Return the minimum, trim and maximum pulse, us, and the sign of a servo output, from the log's SERVOn parameters.
 
     The sign is -1 if the output is reversed, otherwise 1.
+
+    number: number of the output, from 1.
     """
     get_parameter = log.parameters.get
     min_pulse = get_parameter(f"SERVO{number}_MIN", 1100.0)

@@ -39,7 +39,7 @@ Interval = tuple[float, float, float]
 
 
 def wide_quantities(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideQuantity, ...]:
-    """Return sink rate and power in level flight, each only if its 95 % interval is too wide.
+    """Return those of the two quantities, sink rate and power in level flight, whose 95 % interval is too wide.
 
     sink, power: lower bound, estimate and upper bound, in any unit.
     with_current: True if the battery's current was logged, without which no manoeuvre narrows the power's interval.

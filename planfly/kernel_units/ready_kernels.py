@@ -120,7 +120,7 @@ def _compile_flight_kernels() -> None:
 
 
 def _compile_glide_kernels() -> None:
-    """Compile the kernels that judge returns and glides."""
+    """Compile the kernels that judge simulated returns to launch, and glides."""
     scenario, uav = _make_scenario_and_uav()
     setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     return_summary(setup, track=None).data_for_pictures()

@@ -348,6 +348,7 @@ def describe_unfinished_flight(basis: str, end_reason: str, verdict: Verdict) ->
     Findings of `_RULES_OF_UNFINISHED_PATHS` are left out.
 
     basis: basis of the verdict, such as "flown in GUIDED".
+    end_reason: reason why the flight ended.
     """
     failed_findings = [finding for finding in verdict.failed if finding.rule not in _RULES_OF_UNFINISHED_PATHS]
     findings_text = count_text(len(failed_findings), "finding") if failed_findings else "no findings"

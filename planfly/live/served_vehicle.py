@@ -33,7 +33,7 @@ def serve_vehicle(
 ) -> None:
     """Serve a MAVLink vehicle until `stop` returns True.
 
-    access: ports and stations of the vehicle's link.
+    access: addresses of the vehicle and its stations, and the key of the link.
     served_scenario: scenario as loaded from `options`.
     on_message: called with one line for each event.
     """

@@ -223,7 +223,7 @@ def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
 
 
 def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
-    """Return limits for a search of paths that have the margin that gusts need at the given plan's altitude.
+    """Return limits for a search for paths with the margin that gusts require at the given plan's altitude.
 
     unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
@@ -247,7 +247,7 @@ def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB
 
 
 def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
-    """Return limits for a search of alternatives to a safe plan: the strictest limits for gusts that this plan meets.
+    """Return limits for a search for alternatives to a safe plan: the strictest limits for gusts that the plan meets.
 
     The limits with a margin for gusts at the ground, missiles and zones are tried first, then those with a margin at
     the ground only.  If the plan meets none of them, or gusts do not displace the aircraft, the limits have no such

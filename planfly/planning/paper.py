@@ -104,7 +104,7 @@ class TableRow:
 
 
 def problem_name(threats: int) -> str:
-    """Return the name of the built-in scenario of a problem."""
+    """Return the name of the built-in scenario of a problem, by its number of threats."""
     return f"paper-{threats:02d}"
 
 
@@ -169,6 +169,8 @@ def plan_section(
 
     The order does not depend on the number of processes.
 
+    problems: numbers of threats, which name the problems.
+    seeds: number of seeds.
     algorithm: algorithm in place of the paper's; the strip and the baselines are always planned, too.
     jobs: number of processes; None for one per available core.
     advance: function called with the progress after each plan.

@@ -70,7 +70,8 @@ class Document:
     stem: stem of the file names under which it is saved.
     setup: setup of the opened mission.
     kind: key in `KINDS`, or "" if the document was not a mission file that the studio can write.
-    data: bytes of the file, as which an unchanged mission is saved in the same format; empty if `kind` is "".
+    data: bytes of the file, which are saved again if an unchanged mission is saved in the same format; empty if `kind`
+        is "".
     path: the file that the command named, which the page may overwrite; None for any other document.
     on_disk: bytes of this file when it was last read or written.
     to_plan: True for a scenario that has no path yet.
@@ -189,12 +190,18 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
-    """Return the flight setup of the mission in a log, with the UAV of `scenario`."""
+    """Return the flight setup of the mission in a log, with the UAV of its scenario.
+
+    seed: seed of the flight.
+    """
     return make_setup(scenario, load_uav(scenario), mission, seed)
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
-    """Return a placeholder plan: the straight line from start to destination, not certified."""
+    """Return a placeholder plan: the straight line from start to destination, which no check has certified.
+
+    seed: seed that the plan states.
+    """
     line = np.stack([scenario.start, scenario.destination])
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
     counts, objectives = Violations(0, 0, 0, 0), Objectives(1.0, 0.0, 0.0, 0.0)

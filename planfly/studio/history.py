@@ -74,6 +74,7 @@ class History:
 
         mission: the mission that the edit made.
         text: description of the edit.
+        parameters: autopilot parameters that the edit changed.
         """
         self.steps = [*self.steps[: self.position], Step(mission, text, parameters)][-MAX_STEPS:]
         self.position = len(self.steps)

@@ -109,7 +109,11 @@ class Delete(_Message):
 
 
 class Raise(_Message):
-    """Change of the altitude of items by ``by`` metres.  ks: indices of the items; null for all items."""
+    """Change of the altitude of items.
+
+    by: change, m, positive upwards.
+    ks: indices of the items; null for all items.
+    """
 
     kind: Literal["raise"]
     rev: _Rev
@@ -143,8 +147,10 @@ class Settings(_Message):
 
     Values are checked like the values of a scenario.
 
-    limits: entries of [limits]; null removes an entry.  ceiling: m AMSL.
-    parameter: one autopilot parameter, as NAME=VALUE.  without: names of the parameters to reset.
+    limits: entries of [limits]; null removes an entry.
+    ceiling: m AMSL.
+    parameter: one autopilot parameter, as NAME=VALUE.
+    without: names of the parameters to reset.
     parameter_file: name of a parameter file, whose text is parameter_text.
     """
 

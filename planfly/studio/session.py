@@ -186,6 +186,7 @@ class Session:
 
         mission: the mission that the edit made.
         text: description of the edit.
+        parameters: autopilot parameters that the edit changed.
         """
         self.history.add(mission, text, parameters)
         self.undone_states = []
@@ -414,9 +415,11 @@ class Session:
         self.rev += 1
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
-        """Return the mission with an item moved to a position, m, or altitude, m AMSL.
+        """Return the mission with an item moved on the map, to another altitude, or both.
 
-        A coordinate of None is not changed.
+        index: index of the item.
+        east, north: new map position, m; the item stays there if one of them is None.
+        altitude: new altitude, m AMSL; None keeps the altitude.
         """
         mission = self.mission
         edits.movable_item(mission, index)
@@ -432,7 +435,10 @@ class Session:
         return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
 
     def item_position(self, index: int) -> tuple[float, float, float]:
-        """Return east, north and altitude AMSL of an item, m. Raises MissionError if the item has no position."""
+        """Return east, north and altitude AMSL of the item with an index, m.
+
+        Raises MissionError if the item has no position.
+        """
         edits.movable_item(self.mission, index)
         east, north, altitude = self.context.item_positions(self.mission)[
             edits.movable_indices(self.mission).index(index)

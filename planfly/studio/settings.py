@@ -85,7 +85,7 @@ class ChangedParameters:
         return parameters_text(self.values, title)
 
     def with_values(self, values: Mapping[str, float | None]) -> "ChangedParameters":
-        """Return the parameters with some values set, by name, or removed, by None."""
+        """Return the parameters after some values were set by name; a value of None removes a parameter."""
         merged = {name: value for name, value in (self.values | dict(values)).items() if value is not None}
         typed = tuple(name for name in dict.fromkeys((*self.typed, *values)) if name in merged)
         return ChangedParameters(merged, self.file if merged else "", self.unused if merged else (), typed)
@@ -124,7 +124,7 @@ def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, st
 
 
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
-    """Rewrite an error about changed settings with the labels that the settings have on the page.
+    """Return an error about changed settings, rewritten with the labels that the settings have on the page.
 
     The scenario's name, which may be the name of the mission file, is omitted.
 

@@ -55,7 +55,10 @@ _MIN_HEIGHT_RATIO = 0.9
 
 
 def round_to_json(values: Any, digits: int = 1) -> Any:
-    """Return an array as (nested) lists of rounded numbers; NaN and infinity become None."""
+    """Return an array as (nested) lists of numbers rounded to a number of decimals (`digits`).
+
+    NaN and infinity become None.
+    """
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
         return array.tolist()

@@ -174,7 +174,7 @@ def _count_usable(verdict: Verdict) -> tuple[int, int]:
 
 
 def _usable_parts(verdict: Verdict) -> list[float]:
-    """Return the usable part of each photo line, %; 0 for a line that was not flown or not judged."""
+    """Return the usable part of each photo line according to a verdict, %; 0 for a line not flown or not judged."""
     return [0.0 if finding.flown is None else finding.flown for finding in _line_findings(verdict)]
 
 
@@ -184,9 +184,9 @@ def _line_findings(verdict: Verdict) -> list[Finding]:
 
 
 def _success_key(verdict: Verdict) -> tuple[int, float, int, float]:
-    """Return a sort key that is larger for a flight closer to success.
+    """Return a sort key of a flight's verdict, which is larger the closer the flight is to success.
 
-    Its parts are the number of usable lines, the mean usable part of the lines in whole %, the negative number of
+    Its entries are the number of usable lines, the mean usable part of the lines in whole %, the negative number of
     failed findings, and the sum of the margins of photo overlaps that fail, %.
     """
     parts = _usable_parts(verdict)

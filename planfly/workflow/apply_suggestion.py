@@ -108,7 +108,7 @@ def apply_suggestion(
 
 
 def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
-    """Return {(rule, place): ok is False} of the failed and undecided findings: True if failed, False if undecided."""
+    """Return the failed and undecided findings of a verdict, as {(rule, place): True if failed, False if undecided}."""
     open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
     return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 

@@ -395,7 +395,7 @@ def climb_deviation(sized: SizedAircraft) -> float:
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Return climb angle, rad, descent angle, rad, top speed, m/s, and the logarithm of the cruise power in W, (4,).
+    """Return climb angle (rad), descent angle (rad), top speed (m/s) and logarithm of the cruise power (W), (4,).
 
     The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
     in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.

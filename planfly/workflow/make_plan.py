@@ -49,6 +49,8 @@ def make_plan(
     turns also hold in the local wind of a forecast (`planfly.planning.local_wind`).  Departure and approach are added.
     If the autopilot loiters at the end of the mission, the certificate names hazards that may be close to the loiter.
 
+    seed: seed of the search.
+    algorithm: name of the algorithm; None for the default.
     stop: stop condition of `planner.search.plan_path.plan_path`.
     flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.
     continues: True if the mission continues beyond the destination of the plan.

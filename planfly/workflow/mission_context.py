@@ -115,7 +115,7 @@ class MissionContext:
         return frozenset(stop.item for stop in self.place_mission(mission).stops)
 
     def to_geographic(self, east: float, north: float) -> tuple[float, float]:
-        """Return latitude and longitude of a map position, degrees."""
+        """Return latitude and longitude, degrees, of a map position, m."""
         lat, lon = to_geo(self.scenario.origin, east, north)
         return float(lat), float(lon)
 

@@ -91,7 +91,7 @@ def open_flight(
 
 
 def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
-    """Extend a scenario's terrain to the mission's home, if the link's ground station stands there.
+    """Return a scenario with its terrain extended to the mission's home, if the link's ground station stands there.
 
     The terrain is unchanged if its elevation file cannot be read, or has no data at home.
     """
@@ -188,6 +188,7 @@ def make_setup(
     """Make the setup of a mission's flight in a scenario.
 
     placed: the mission placed on the map of the scenario, if already computed.
+    seed: seed of the turbulence and the navigation error.
     plan: plan from which the mission was made; None for a mission from a file.
     fdm_hz: step rate of JSBSim, Hz.
     engine: flight model that flies.

@@ -138,9 +138,11 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Check a folder with `check_output_folder`, make it, and remove old results of planfly from it.
+    """Check an output folder, make it if it is missing, and remove old results of planfly; return its path.
 
-    Returns the path of the folder.
+    files: names of the results to remove, as for `prepare_folder`.
+    overwrite: True permits a folder that is not empty.
+    Raises PlanflyError as `check_output_folder`.
     """
     folder = Path(out)
     check_output_folder(folder, overwrite)
@@ -161,7 +163,7 @@ def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrit
 
 
 def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
-    """Return a path with {name} and {seed} replaced; unsafe characters of the name become "-".
+    """Return the path `target` with {name} and {seed} replaced; unsafe characters of the name become "-".
 
     If this changes the name, the first digits of the name's SHA-256 are appended, so that different names stay
     different.

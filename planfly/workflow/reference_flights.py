@@ -170,7 +170,7 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 def judge_airframe_flight(
     setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
 ) -> AirframeAnswer:
-    """Fly a setup with planfly's guidance and no navigation error; answer if the airframe itself can fly the mission.
+    """Fly a setup with planfly's guidance and no navigation error, to find out if the airframe can fly the mission.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -193,9 +193,9 @@ def judge_airframe_flight(
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find an autopilot parameter with another value of which a failed flight passes; None if none is found.
+    """Find an autopilot parameter that makes a failed flight pass if it has another value; None if none is found.
 
-    It is also None for a flight that passes, and for an autopilot without parameters.
+    The result is also None for a flight that passes, and for an autopilot without parameters.
 
     verdict: verdict on the flight with the setup's own parameters.
     should_abort: called throughout the flights; once it returns True, they are aborted with TrialAborted.

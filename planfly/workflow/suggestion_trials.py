@@ -218,6 +218,7 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
 def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
     """Return the findings that a change makes worse: they newly fail, or are no longer decided or judged.
 
+    old_verdict, new_verdict: verdicts before and after the change.
     A finding that was not judged before, because the flight ended early, is left out.
     """
     has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
@@ -230,8 +231,9 @@ def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Findin
 
 
 def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
-    """Return the open findings of a changed mission that the change does not make worse.
+    """Return the failed and undecided findings after a change that the change does not make worse.
 
+    old_verdict, new_verdict: verdicts before and after the change.
     They fail or are undecided after the change.  Before it, they were not judged because the flight ended early, or
     they failed and are now only undecided.
     """
@@ -244,7 +246,10 @@ def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[Rema
 
 
 def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a finding does not fail after a change, and no finding newly fails."""
+    """Return True if a finding does not fail after a change, and no finding newly fails.
+
+    old_verdict, new_verdict: verdicts before and after the change.
+    """
     has_new_failures = any(added.ok is False for added in worsened_findings(old_verdict, new_verdict))
     return not has_new_failures and finding_key(finding) not in map(finding_key, new_verdict.failed)
 
@@ -252,6 +257,7 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
     """Return True if a change makes a finding pass or disappear, and makes no other finding worse.
 
+    old_verdict, new_verdict: verdicts before and after the change.
     A slope passes only if the altitude error on its leg becomes clearly smaller.
     """
     new_finding = _worst_findings(new_verdict).get(finding_key(finding))
@@ -598,7 +604,7 @@ def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> b
 
 
 def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
-    """Return the distance by which a path passes the zone of a finding too closely, m.
+    """Return by how much a path is closer to the zone of a finding than the navigation error, m.
 
     Returns 0 if no other finding of the verdict names this zone as the nearest zone.
     """
@@ -661,7 +667,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
-    """Enlarge a suggestion by what an open finding still needs; None if it needs another kind of change."""
+    """Return a suggestion enlarged by what an open finding still needs; None if it needs another kind of change."""
     kinds = {change.what for change in suggestion}
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:
@@ -678,7 +684,7 @@ def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggest
 
 
 def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
-    """Merge the steps still needed into the steps of a suggestion.
+    """Return the steps of a suggestion, merged with the steps that are still needed.
 
     If a place already has a step of the same kind, the needed step is enlarged and added to it.
     """
@@ -698,7 +704,7 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
 
 
 def _merge_energy_changes(change: Change, needed_change: Change) -> Change:
-    """Combine two successive changes of the energy carried, or of the duration, into one change.
+    """Return one change that equals two successive changes of the energy carried, or of the duration.
 
     >>> from logs.verdict.places import FLIGHT
     >>> battery, duration = Change("battery", FLIGHT, None, 1.5, "1"), Change("duration", FLIGHT, None, 40.0, "%")

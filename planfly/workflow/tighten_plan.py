@@ -243,6 +243,8 @@ def refine(
 def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes: list[Tightening]) -> str:
     """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end.
 
+    verdict, was_flown: verdict on the round's plan, and True if the plan was flown.
+    is_last: True if no further round is allowed.
     changes: limits that were tightened after the round.
     """
     if verdict.flyable:

@@ -52,9 +52,9 @@ class Tally(NamedTuple):
 
 
 def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return the exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934).
+    """Return the exact two-sided interval of a success probability, by Clopper and Pearson (Biometrika 26, 1934).
 
-    Its coverage is at least ``confidence``.
+    Its coverage is at least ``confidence``.  It is 0 to 1 without trials.
 
     >>> [round(bound, 4) for bound in clopper_pearson(299, 299)]
     [0.9877, 1.0]
@@ -63,9 +63,9 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return Wilson's score interval (JASA 22, 1927), for use in pictures.
+    """Return Wilson's two-sided score interval of a success probability (JASA 22, 1927), for use in pictures.
 
-    Its mean coverage is near ``confidence``.
+    Its mean coverage is near ``confidence``.  It is 0 to 1 without trials.
 
     >>> [round(bound, 4) for bound in wilson(8, 10)]
     [0.4902, 0.9433]
@@ -209,9 +209,11 @@ class StoppingBound:
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
 
     def interval(self, successes: int, failures: int) -> Interval:
-        """Return the interval of the probabilities p that the flights do not exclude.
+        """Return the interval of the success probabilities p that the flights do not exclude.
 
-        It contains the fraction of successes.
+        It contains the fraction of successes, and is 0 to 1 without flights.
+
+        successes, failures: numbers of flights.
         """
         trials = successes + failures
         if not trials:

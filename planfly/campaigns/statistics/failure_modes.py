@@ -327,6 +327,7 @@ def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -
 
     They are in m/s per unit of the coefficient, and follow from the implicit function theorem.
 
+    modes: fitted failure modes for one link.
     draws: drawn quantities, (m, d).
     speed: wind speed at the boundary, m/s.
     """

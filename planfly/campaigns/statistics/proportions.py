@@ -29,6 +29,7 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 
     only_first, only_second: number of pairs in which only the first trial, or only the second, succeeded.
     pairs: number of all pairs, at least 1.
+    confidence: confidence of the interval.
 
     >>> difference = paired_difference(2, 12, 50)
     >>> difference.value, round(difference.p_value, 4)
@@ -75,6 +76,7 @@ def independent_difference(
     is from Fisher's exact test.
 
     first, second: number of successes, and number of trials, at least 1.
+    confidence: confidence of the interval.
 
     >>> low, high = independent_difference((48, 80), (56, 70)).interval
     >>> round(low, 4), round(high, 4)
