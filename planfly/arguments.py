@@ -12,10 +12,11 @@ from world.errors import ArgumentError
 class Range(NamedTuple):
     """Range of allowed values of a number.
 
-    low, high: minimum and maximum.
-    above: True if the value must be above ``low``.  below: True if it must be below ``high``.
-    expected: text of the error.
+    low, high: minimum and maximum, both allowed unless `above` or `below` excludes them.
+    expected: text that an error states, such as "expected a share from 0 to 1".
     integer: True if only whole numbers are allowed.
+    above: True if the value must be above ``low``.
+    below: True if the value must be below ``high``.
     """
 
     low: float
@@ -124,8 +125,8 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 def check_arguments(**arguments: Any) -> None:
     """Raise ArgumentError for the first argument that is outside its range or not an allowed word.
 
-    arguments: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.  A keyword
-    of `CHOICES` may also have a tuple of allowed words.
+    arguments: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.  For a name
+        in `CHOICES`, the value may also be a tuple of several allowed words.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
@@ -162,9 +163,10 @@ CAMERA_FORMAT = (
 
 
 def is_valid_wind(speed: float, from_deg: float) -> bool:
-    """Return True if the speed and the direction of a wind are allowed.
+    """Return True if the speed and the direction of a wind are allowed; NaN is not allowed.
 
-    speed: 0 to 40 m/s.  from_deg: direction from which the wind blows, -360 to 360 degrees.
+    speed: wind speed, allowed from 0 to 40 m/s.
+    from_deg: direction from which the wind blows, allowed from -360 to 360 degrees.
 
     >>> is_valid_wind(8.0, 270.0), is_valid_wind(float("nan"), 0.0)
     (True, False)
@@ -182,9 +184,11 @@ def is_valid_position(lat: float, lon: float) -> bool:
 
 
 def parse_position(keyword: str, coordinates: Sequence[float]) -> tuple[float, float]:
-    """Return a latitude and a longitude, degrees.  Raises ArgumentError for anything else.
+    """Return a latitude and a longitude as two numbers, degrees.
 
     keyword: name of the argument, for the message.
+    coordinates: latitude and longitude, as numbers or as texts of numbers.
+    Raises ArgumentError for other input, and for a position that is not allowed.
 
     >>> parse_position("station", ["46", 8])
     (46.0, 8.0)

@@ -202,7 +202,7 @@ def build_parser() -> LineParser:
 
 
 def _exit_code_and_text(error: BaseException, parser: CommandParser | None = None) -> tuple[int, str]:
-    """Return the exit code and the line of one of `_REPORTED_ERRORS`.
+    """Return the exit code of the command, and the line to print, for one of `_REPORTED_ERRORS`.
 
     parser: parser of the command, whose options replace keywords in the text of a PlanflyError.
     """

@@ -15,7 +15,7 @@ CUT_SHORT = "the log ends before the flight does"
 def is_log(path: Path) -> bool:
     """Return True if a file is a flight log of planfly, by its first bytes or the suffix .mcap.
 
-    A folder is judged only by its suffix.
+    A folder or a missing file is judged only by its suffix.
     Raises PlanflyError for a file that cannot be read.
     """
     if path.exists() and not path.is_file():
@@ -29,7 +29,7 @@ def is_log(path: Path) -> bool:
 
 
 def judge_log(log: FlightLog) -> Verdict:
-    """Judge a logged flight from its recorded track."""
+    """Judge a logged flight from its recorded track, and return the verdict."""
     return judge_flight(
         log.setup, log.track, log.ended or CUT_SHORT, log_complete=log.complete, reference=log.reference
     )

@@ -47,7 +47,9 @@ MAX_MEGABYTES = 256.0
 
 
 class FlightOptions(TypedDict, total=False):
-    """Options of a flight.  A missing option, or None, keeps the value of the scenario.
+    """Options of a flight.
+
+    A missing option, or None, keeps the value of the scenario.
 
     terrain: an elevation file that replaces the terrain of the scenario.
     wind: speed, m/s, and the direction from which the wind blows, degrees.
@@ -56,7 +58,9 @@ class FlightOptions(TypedDict, total=False):
     height and place instead of `wind`; `at` states the take-off.
     at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones that are inactive at this
     time are ignored.  None keeps all zones.
-    aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
+    aircraft: a name, or a folder.
+    airspeed: cruise airspeed, m/s.
+    params: a file of the autopilot's parameters.
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     autopilot: the simulated autopilot: "ardupilot" (in the release that saved the parameter file, or else the newest),
     "ardupilot-4.6", "ardupilot-4.7", "px4" (its release likewise), "px4-1.16", "px4-1.17" or "planfly".
@@ -120,14 +124,18 @@ class LogOptions(MissionOptions, total=False):
 
 
 class LinkOptions(LogOptions, total=False):
-    """Options of a radio link.  A missing option, or None, keeps the entry of the scenario's [link].
+    """Options of a radio link.
+
+    A missing option, or None, keeps the entry of the scenario's [link].
 
     frequency: MHz.
-    power: output power of the transmitter, dBm.  sensitivity: power at which the receiver still works, dBm.
+    power: output power of the transmitter, dBm.
+    sensitivity: power at which the receiver still works, dBm.
     station: latitude and longitude of the station's antenna, degrees; by default the antenna stands at the mission's
     home.
     antenna: height of the station's antenna above ground, m.
-    station_gain, aircraft_gain: antenna gains, dBi.  cable_loss: losses of cables and connectors at both ends, dB.
+    station_gain, aircraft_gain: antenna gains, dBi.
+    cable_loss: losses of cables and connectors at both ends, dB.
     fade_margin: required power above the sensitivity, dB.
     max_outage: longest accepted time below the fade margin, s.
     use: "telemetry" for the ground station's link, "control" for the pilot's remote control.
@@ -158,7 +166,8 @@ class SimulationOptions(TypedDict, total=False):
     sitl: the program of ArduPlane or PX4 built for software in the loop, which then flies the mission.
     engine: "auto" flies the compiled flight model if it equals JSBSim in every bit, "jsbsim" flies JSBSim.
     log_hz: rows per second in the log.
-    max_hours: simulated hours after which the flight is stopped.  max_log: size of the log at which it is stopped, MB.
+    max_hours: simulated hours after which the flight is stopped.
+    max_log: size of the log at which the flight is stopped, MB.
     levels: True also flies a mission that passes with planfly's guidance, and compares the two flights; a mission that
     fails is always flown again.
     """
@@ -191,8 +200,10 @@ class CampaignOptions(MissionOptions, total=False):
 class WindsOptions(MissionOptions, total=False):
     """Options of the flights of a search for the strongest winds, and of the search itself.
 
-    spread: a TOML file of the quantities that vary.  flights: maximum number of flights for all directions together.
-    confidence: confidence level of each interval.  workers: number of processes on this machine; None for one per core.
+    spread: a TOML file of the quantities that vary; None takes planfly's default.
+    flights: maximum number of flights for all directions together.
+    confidence: confidence level of each interval.
+    workers: number of processes on this machine; None for one per core.
     scheduler: address of a running dask scheduler.
     """
 
@@ -251,7 +262,7 @@ class RunOptions(FlightOptions, SimulationOptions, total=False):
 
 
 def option_defaults(options: type) -> dict[str, object]:
-    """Return the default of each option of a group.
+    """Return the default of each option of a group of options, such as `SimulationOptions`, by name.
 
     >>> option_defaults(SimulationOptions)["log_hz"]
     60
@@ -266,14 +277,14 @@ def select_log_options(options: LogOptions) -> dict[str, object]:
 
 
 def select_mission_options(options: MissionOptions) -> MissionOptions:
-    """Return the options of the mission, without the options of a log or a campaign."""
+    """Return only the options of `MissionOptions`, without those of a log or a campaign."""
     return cast(
         MissionOptions, {name: value for name, value in options.items() if name in MissionOptions.__annotations__}
     )
 
 
 def select_log_and_mission_options(options: LogOptions) -> LogOptions:
-    """Return the options without those of a radio link, for `planfly.judge`."""
+    """Return only the options of `LogOptions`, without those of a radio link, for `planfly.judge`."""
     return cast(LogOptions, {name: value for name, value in options.items() if name in LogOptions.__annotations__})
 
 
@@ -291,9 +302,9 @@ def fence_file_names(options: MissionOptions) -> list[str]:
 class NamedFences:
     """Content of the named files of fences, zones and rally points.
 
-    items: fence items.
-    rally: rally points.
-    zones: zones of each file, with the file's name.
+    items: fence items of all files.
+    zones: name and zones of each zone file.
+    rally: rally points of all files.
     """
 
     items: tuple[MissionItem, ...] = ()
@@ -301,9 +312,9 @@ class NamedFences:
     rally: tuple[MissionItem, ...] = ()
 
     def add_to_mission(self, mission: Mission) -> Mission:
-        """Add the named fences and rally points to a mission, which is unchanged without any.
+        """Return the mission with the named fences and rally points added to its own.
 
-        Warnings say that the fences and rally points of the mission still apply.
+        Warnings state that the fences and rally points of the mission still apply.
         """
         if not self.items and not self.rally:
             return mission
@@ -322,7 +333,10 @@ class NamedFences:
         return replace(mission, fences=fences, rally=rally, warnings=warnings)
 
     def add_to_scenario(self, scenario: Scenario) -> Scenario:
-        """Return the scenario with the zones of all files added.  Raises ScenarioError for an invalid zone."""
+        """Return the scenario with the zones of all files added.
+
+        Raises ScenarioError for an invalid zone.
+        """
         for source, file_zones in self.zones:
             scenario = with_zones(scenario, file_zones.zones, source, file_zones.notes)
         return scenario
@@ -383,8 +397,8 @@ def apply_options(
 ) -> Scenario:
     """Return a scenario with options of weather, time and flight applied; the terrain is not changed.
 
-    program: the autopilot program that flies, or None for a simulated autopilot.
-    mission: the mission that is flown, or None.
+    program: executable of the autopilot that flies; None for a simulated autopilot.
+    mission: the mission that is flown; None without a mission.
     If no autopilot is named, the parameter file and the mission determine it, see `with_file_autopilot`.
     Raises ScenarioError for values that a scenario file must not have, ArgumentError for an aircraft that is unknown
     and an airspeed at which it does not fly, ParameterError for the file of another autopilot, and ForecastError for a
@@ -436,10 +450,10 @@ def apply_options(
 
 
 def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
-    """Raise ArgumentError if the options name an unknown aircraft, or an airspeed that it cannot fly.
+    """Raise ArgumentError if the options name an unknown aircraft, or an airspeed that the aircraft cannot fly.
 
-    A wrong value in the file of the aircraft raises FlightError.  An unknown aircraft of the scenario raises
-    nothing here.
+    Raises FlightError for a wrong value in a named aircraft's own file.  An aircraft that only the scenario names is
+    not checked, if it cannot be loaded.
     """
     stated_aircraft, airspeed = flight_entries(options)["aircraft"], options.get("airspeed")
     name = str(stated_aircraft or scenario.flight.aircraft)
@@ -465,7 +479,7 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
 
     The entry of an option that is not given is None.
 
-    program: file of a real autopilot (SITL) that flies instead of a simulated autopilot, or None.
+    program: executable of a real autopilot (SITL) that flies; None for a simulated autopilot.
     Raises ArgumentError for an unknown autopilot, and if both an autopilot and a program are given.
 
     >>> entries = flight_entries({"autopilot": "px4-1.16"})
@@ -554,9 +568,10 @@ _FIRMWARE_TEXTS = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
 def _with_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with `autopilot`, and record `file` as the file that names this autopilot.
+    """Return the scenario with an autopilot, and with the file that names it as the source.
 
-    The autopilot is set even if it is the default autopilot.
+    autopilot: name of the autopilot, which is stated even if it is the default.
+    file: name of the file, for messages.
     """
     params = scenario.flight.params
     new_scenario = with_flight(scenario, autopilot=autopilot, params=params)

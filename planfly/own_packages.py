@@ -14,7 +14,8 @@ _BAD_USAGE_CODE = 2
 class HiddenPackage(NamedTuple):
     """Package of planfly that another module hides.
 
-    hiding_file: file of the other module.  package_file: file of the package.
+    hiding_file: file of the other module.
+    package_file: file of the package.
     """
 
     hiding_file: str
@@ -26,7 +27,7 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
 
     Return None if no module hides a package.
 
-    home: the folder of planfly and its packages.
+    home: the folder that contains planfly and its packages.
 
     >>> find_hidden_package(Path(__file__).parents[1]) is None
     True

@@ -54,9 +54,10 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
 
 
 def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerPage:
-    """Return the page of a battery search: its chart, what decides the capacity, and energy by leg.
+    """Return the page of a battery search: the chart, a table of what decides the capacity, and the energy by leg.
 
-    The end of the mission or a return decides the capacity in the flights in which it needs the most energy.
+    The capacity of a flight is decided by the end of the mission or by the simulated return to launch that has used
+    more energy.
 
     figure: chart of the capacities.
     command: command line that repeats the search; "" without one.

@@ -16,8 +16,8 @@ _MAX_LISTED = 3
 def answer_line(result: BatteryResult) -> str:
     """Return a line with the smallest sufficient battery and its confidence interval.
 
-    If there is none, the line gives the reason: returns that do not arrive, or a battery that would need too much
-    energy to carry itself. If flights are not judged, the line says why.
+    If no battery suffices, the line gives the reason: returns that do not arrive, or a battery that would need too much
+    energy to carry itself. If the battery is not judged, the line gives the reason, too.
     """
     goal = result.goal
     flown_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
@@ -125,7 +125,7 @@ def battery_lines(result: BatteryResult) -> list[str]:
 
 
 def leg_names(result: BatteryResult) -> list[str]:
-    """Return the name of each leg as in messages; the legs of one loiter share a name."""
+    """Return the name of each leg number, as in messages; all legs of one loiter share a number."""
     requirements = route_requirements(result.base.nominal_setup())
     numbers = requirements.setup.route.leg_numbers
     first_legs = np.searchsorted(numbers, np.arange(int(numbers[-1]) + 1)).tolist()
@@ -133,12 +133,12 @@ def leg_names(result: BatteryResult) -> list[str]:
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return a row (part, flights, share) for each part of the flight that decides the battery.
+    """Return a row (part, flights, share) for each part that decides the battery in some flights.
 
-    The end of the mission or a return decides the battery of a flight if it needs the most energy.  The most frequent
-    part comes first.
+    A part decides the battery of a flight if more energy is used at its end than at the end of any other part.  The
+    most frequent part comes first.
 
-    part: the end of the mission, or a return.
+    part: the mission, or a simulated return to launch, in words.
     flights, share: number and percentage of the flights in which this part decides.
     """
     names, total = leg_names(result), len(result.completed)
@@ -155,7 +155,7 @@ def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
 
 
 def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return a row for each leg: its median energy, and its share of the mission's energy."""
+    """Return a row for each leg number: name, median energy, and share of the sum of these energies."""
     energies, total = result.leg_energies.tolist(), float(result.leg_energies.sum())
     return [
         (name, f"{energy:.1f} Wh", f"{energy / total:.0%}" if total > 0.0 else "")

@@ -54,10 +54,10 @@ _STRIP_ERROR_STREAM = 71
 
 @dataclass(frozen=True)
 class CampaignBase:
-    """Mission of a campaign, and the dispersions around it.
+    """Inputs that all flights of a campaign share: the mission, its scenario and UAV, and the dispersions.
 
     scenario: the planned scenario; every flight flies `mission` in this scenario, with its own wind.
-    uav: the uav in this scenario.
+    uav: the UAV in this scenario.
     placed: the mission placed on the terrain that the planner knows, even if a flight has another terrain.
     plan: the plan of the mission; None for a mission from a file.
     seed: seed of the draws.
@@ -147,9 +147,12 @@ def open_campaign(
     """Open the base of a campaign for a plan, a mission file or a scenario; plan a path for a scenario.
 
     target: a built-in scenario's name, a scenario's TOML file, a scenario, a plan, or a plan.json, .waypoints or .plan.
-    options: options of the flights.  The plan avoids their zones; their seed is used for the plan and for the draws.
-    plan_file: file of a scenario's plan, which is read if it exists, and written otherwise.  Raises a PlanflyError for
-    bad input, for a plan that is not feasible, and if the aircraft cannot fly at the medians of the dispersions.
+    options: options of the flights.  A planned path avoids the zones of the option "fence"; plan and draws use the
+        option "seed".
+    plan_file: file of a scenario's plan, which is read if it exists, and written otherwise; None for no file.
+
+    Raises a PlanflyError for bad input, for a plan that is not feasible, and if the aircraft cannot fly at the medians
+    of the dispersions.
     """
     if isinstance(target, Plan) or is_mission_file(target):
         return campaign_of_setup(open_flight(target, options), dispersions)
@@ -186,7 +189,8 @@ def open_campaign(
 def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
     """Make a campaign base from a flight setup; each of its flights flies the setup's mission.
 
-    Raises SpreadError if the aircraft cannot fly at the medians of the dispersions.
+    Raises PlanflyError if the aircraft cannot fly at the medians of the dispersions, or if the mission has no valid
+    route.
     """
     # Use the name without the folder, because the folder does not affect the flight.
     mission = replace(setup.mission, source=Path(setup.mission.source).name)
@@ -199,7 +203,7 @@ def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignB
 
 
 def _check_base(base: CampaignBase) -> CampaignBase:
-    """Return a campaign base, after checking that its aircraft can fly and its mission has a route.
+    """Return a campaign base unchanged, after checking that its aircraft can fly and its mission has a route.
 
     Raises PlanflyError if the aircraft cannot fly level at the medians of the dispersions, or if the mission has no
     valid route.
@@ -258,7 +262,7 @@ _VARIED_PROPERTIES = {"aero/drag-factor": "drag", "aero/control-factor": "contro
 
 
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
-    """Add the draws of the aircraft's properties, if the aircraft's folder has a file of them.
+    """Return dispersions with the draws of the aircraft's properties, if the aircraft's folder has a file of draws.
 
     A dispersions file is used unchanged if it names other draws, or disperses drag or control power itself.
     """
@@ -285,7 +289,7 @@ MAX_WIND_GRADIENT = 0.05
 class GivenWind(NamedTuple):
     """Mean wind that replaces the scenario's wind.
 
-    speed: m/s.
+    speed: wind speed, m/s.
     from_deg: direction from which the wind blows, degrees.
     """
 
@@ -297,7 +301,7 @@ class GivenWind(NamedTuple):
 class VariedFlight:
     """A flight with the values of a draw.
 
-    setup, uav: setup and uav in the drawn wind and terrain.
+    setup, uav: setup and UAV in the drawn wind and terrain.
     off_nominal: drawn differences that the autopilot does not know.
     """
 
@@ -312,7 +316,7 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`.  The autopilot does not know
     the drawn mass, drag, control power, aircraft properties and start position.
 
-    wind: mean wind that the draw varies; None for the wind of the scenario.
+    wind: mean wind to which the draw adds its differences; None for the wind of the scenario.
     """
     # The gusts of the drawn wind have no seed of their own.
     values, old_wind = draw.values, base.scenario.wind
@@ -381,8 +385,8 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
 
     At the strip, and up to `_SURVEYED_DISTANCE_M` beyond its ends, the error is `strip_error`.  Over the next
     `_SURVEY_BLEND_DISTANCE_M` it changes linearly to `error`.
-    error: m.
-    strip_error: m; None if the strip was not surveyed.
+    error: error of the elevation file, m.
+    strip_error: error of the strip's survey, m; None if the strip was not surveyed.
     """
     if strip is None or strip_error is None:
         return replace(terrain, heights=terrain.heights + np.float32(error)) if error else terrain

@@ -13,7 +13,7 @@ _MAX_DESCRIBED = 6
 
 
 def hash_input(content: str | bytes) -> str:
-    """Return the hash that represents a long input."""
+    """Return the hash, with its prefix, that represents a long input in place of its content."""
     data = content.encode() if isinstance(content, str) else content
     return _HASH_PREFIX + hashlib.sha256(data).hexdigest()[:16]
 

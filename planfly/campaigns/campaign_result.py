@@ -57,7 +57,11 @@ def winds_command_line(target: str, goal: WindsGoal, options: Mapping[str, objec
 
 
 def command_line(command: str, target: str, options: Mapping[str, object]) -> str:
-    """Return a command line with quoted options; options that are None or have their default are omitted.
+    """Return a ``planfly`` command line with quoted options.
+
+    command, target: name of the command, and its positional argument.
+    options: values by name.  True gives a flag, and a list repeats the option.  Options that are None, False or equal
+        to their default are omitted.
 
     >>> command_line("ground-risk", "a b.plan", {"glide": True, "controlled": False, "max_speed": 31.0})
     "planfly ground-risk 'a b.plan' --glide --max-speed 31"
@@ -73,7 +77,7 @@ def command_line(command: str, target: str, options: Mapping[str, object]) -> st
 
 
 def _option_text(value: object) -> str:
-    """Return the text of an option's value; numbers of a tuple are separated by commas."""
+    """Return an option's value as text; the entries of a tuple are separated by commas."""
     if isinstance(value, tuple):
         return ",".join(_option_text(number) for number in value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
@@ -89,7 +93,8 @@ MAX_FLIGHTS = 5000
 class CampaignResult:
     """Result of `planfly.campaign`.
 
-    columns: columns of the table of flights, (n,) each.
+    summary: probability, failures and deciding rules of the flights.
+    columns: columns of the table of flights by name, (n,) each.
     table: file of this table; None if it was not kept.
     """
 
@@ -114,7 +119,7 @@ class CampaignResult:
 
     @property
     def answer(self) -> Answer:
-        """Answer to the goal: the target is reached, missed, or undecided."""
+        """Answer to the goal: "reached", "missed" or "undecided"; "no target" without a target."""
         return self.summary.estimate.answer
 
     @property
@@ -164,7 +169,7 @@ class CampaignResult:
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """Return the goal of a campaign from keyword arguments.
+    """Return the goal of a campaign from the keyword arguments of `planfly.campaign`; None stands for a default.
 
     Raises ArgumentError for numbers outside their ranges, and if both `prove` and `at_least` are given.
 

@@ -22,6 +22,7 @@ class ComparedCampaign:
     """One of two campaigns that are compared.
 
     name: its folder.
+    tally: number of flights with each outcome.
     interval: two-sided interval of the probability of a flyable flight, at 95 % confidence.
     failed_by_rule: number of compared flights that failed each rule.  Compared flights are the pairs, or all flights if
         there are no pairs.
@@ -56,14 +57,17 @@ class CampaignComparison:
 
     @property
     def answer(self) -> Literal["more likely", "less likely", "no difference shown"]:
-        """Answer to "are flights of the second campaign more likely flyable?", by the interval."""
+        """Answer to "are flights of the second campaign more likely flyable?".
+
+        It is "no difference shown" if the interval of the difference contains 0.
+        """
         if self.difference.interval.low > 0.0:
             return "more likely"
         return "less likely" if self.difference.interval.high < 0.0 else "no difference shown"
 
     @property
     def rules(self) -> list[tuple[str, int, int]]:
-        """Rules that flights failed, with the number of failed flights of each campaign, the largest change first."""
+        """Each failed rule, with the number of flights that failed it in either campaign; the largest change first."""
         first, second = self.first, self.second
         names = [name for name in RULE_WORDS if name in first.failed_by_rule or name in second.failed_by_rule]
         counts = [(name, first.failed_by_rule.get(name, 0), second.failed_by_rule.get(name, 0)) for name in names]

@@ -51,7 +51,8 @@ def connect_client(address: str) -> Any:
 class CampaignPlugin(WorkerPlugin):
     """Campaign on a worker; dask installs it on every worker, including late ones and replacements.
 
-    name: name of the campaign on its scheduler.
+    name: name under which a worker registers the campaign.
+    copy: the campaign, packed for its workers.
     """
 
     def __init__(self, name: str, copy: CampaignCopy) -> None:
@@ -62,6 +63,7 @@ def fly_task(campaign: str, request: FlightRequest) -> FlightRow:
     """Fly the requested flight of a campaign on the dask worker that runs this task.
 
     campaign: name under which the campaign is registered on the worker.
+    Raises WorkerError if the software of this worker differs, and TypeError for a name that is not a campaign's.
     """
     worker = get_worker()
     plugin = worker.plugins[campaign]
@@ -74,7 +76,8 @@ class DaskPool:
     """Workers of a cluster that fly the flights of a campaign.
 
     client: a `distributed.Client`.
-    fly: function that flies a flight.
+    base: inputs that all flights of the campaign share.
+    fly: function that flies one flight of the campaign.
     """
 
     def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
@@ -95,7 +98,10 @@ class DaskPool:
         A flight whose worker died `MAX_WORKER_DEATHS` times is yielded as lost.
 
         next_request: returns the next request, or None while no request is ready; called again after each flight.
-        Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
+        The iteration ends when no request is ready and no flight is in progress.
+
+        Raises a `world.errors.PlanflyError` that a flight raised, RuntimeError for any other error of a flight, and
+        OSError if the scheduler is lost.
         """
         flying: dict[tuple[str, int], FlightRequest] = {}
         abandoned_counts: Counter[FlightRequest] = Counter()
@@ -141,7 +147,7 @@ class DaskPool:
     def _result_row(self, future: Any, request: FlightRequest) -> FlightRow | None:
         """Return the row of a flight, or None if dask abandoned the flight because its workers died.
 
-        Raises OSError if the scheduler is lost.
+        Raises as `fly`.
         """
         if future.status == "finished":
             # Until it is fetched, a result is lost if its worker dies.  Dask then flies again, and may give up, too.

@@ -38,7 +38,7 @@ class Quantity(NamedTuple):
     combine: "added" if the drawn number is added to the scenario's value, "factor" if it multiplies that value.
     unit: unit of an added value; "" for a factor.
     low, high: minimum and maximum value that may be drawn; values outside this range are unrealistic.
-    integer: True for a number of steps, with a discrete distribution.
+    integer: True for a whole number of steps, which needs a discrete distribution.
     title: name shown to the user.
     """
 
@@ -99,7 +99,7 @@ class VaryingQuantity:
 
     distribution: name in `scipy.stats`.
     parameters: keyword arguments of the distribution in `scipy.stats`.
-    source: source of the numbers.
+    source: where the numbers come from, as stated in the dispersions file.
     """
 
     quantity: Quantity
@@ -116,7 +116,7 @@ class VaryingQuantity:
 
     @cached_property
     def _range_probabilities(self) -> tuple[float, float]:
-        """Cumulative probabilities at the lower and the upper end of the quantity's range."""
+        """Cumulative probability of the distribution below, and up to the end of, the quantity's range."""
         min_value = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._scipy_distribution.cdf(min_value)), float(self._scipy_distribution.cdf(self.quantity.high))
 
@@ -127,7 +127,7 @@ class VaryingQuantity:
         return upper_probability - lower_probability
 
     def value(self, fraction: float) -> float:
-        """Return the quantile of the distribution, truncated to the quantity's range.
+        """Return a quantile of the distribution truncated to the quantity's range.
 
         fraction: cumulative probability of the quantile, 0 to 1.
 
@@ -138,7 +138,7 @@ class VaryingQuantity:
         return float(self.values(np.array([fraction]))[0])
 
     def values(self, fractions: Floats) -> Floats:
-        """Return the quantile of each cumulative probability, (n,); see `value`."""
+        """Return the quantiles of cumulative probabilities (n,), as `value` does, (n,)."""
         lower_probability, upper_probability = self._range_probabilities
         values = self._scipy_distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
         return np.clip(values, self.quantity.low, self.quantity.high)
@@ -157,7 +157,7 @@ class Dispersions:
     draws: Draws | None = None
 
     def without(self, names: tuple[str, ...]) -> "Dispersions":
-        """Return the dispersions without the named quantities."""
+        """Return the dispersions without the quantities that have one of the names."""
         return replace(self, varying=tuple(varying for varying in self.varying if varying.quantity.name not in names))
 
     def with_draws(self, draws: Draws) -> "Dispersions":
@@ -171,7 +171,7 @@ class Dispersions:
         return replace(self.without(QUANTITIES_OF_DRAWS), draws=draws)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
-        """Return plain data with a table for each quantity, and a table for the aircraft's draws."""
+        """Return plain data with a table for each quantity, and one for the aircraft's draws, if there are any."""
         tables: dict[str, dict[str, Any]] = {
             varying.quantity.name: {
                 "distribution": varying.distribution,
@@ -357,6 +357,7 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
 
     The flights are drawn as in `draw_flight`.  d is the number of varying quantities that have more than one value.
 
+    seed: seed of the campaign.
     start, stop: index of the first flight, and of the flight after the last.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
@@ -369,9 +370,9 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
 
 
 def standard_population(dispersions: Dispersions, count: int) -> Floats:
-    """Return points that cover the dispersions evenly, in standard deviations as in `standard_draws`, (count, d).
+    """Return evenly spread possible draws, in standard deviations as in `standard_draws`, (count, d).
 
-    The points are a Sobol sequence, each at the center of its cell.
+    The cumulative probabilities are a Sobol sequence, with each point at the center of its cell.
 
     count: number of points, a power of two.
 

@@ -15,7 +15,8 @@ from world.wording import count_text
 class RuleFailures:
     """Numbers of flights that failed a rule, in total and at each place.
 
-    A flight may fail at several places.
+    flights: number of flights that failed the rule anywhere.
+    places: each place with its number of flights, the most frequent first; a flight may fail at several places.
     """
 
     rule: str

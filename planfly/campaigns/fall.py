@@ -24,7 +24,7 @@ _MAX_FALL_S = 600.0
 
 
 def plate_drag(aircraft: Aircraft) -> float:
-    """Return the drag of a fall with the wing broadside to the air, per mass and airspeed squared, 1/m."""
+    """Return drag / (mass * airspeed^2) of a fall with the wing broadside to the air, 1/m."""
     return 0.5 * _AIR_DENSITY * _PLATE_DRAG_COEFFICIENT * aircraft.wing_area / aircraft.mass
 
 
@@ -36,7 +36,7 @@ def impact_points(
     Where the terrain is unknown, the lowest known terrain below the falls is used.
 
     position, velocity: position, m, and ground velocity, m/s, at the start of each fall, (n, 3).
-    drag: drag per mass and square of the airspeed, 1/m.
+    drag: drag / (mass * airspeed^2), 1/m; 0 for a fall without drag.
     find_wind: function from positions, m, (n, 3), to the wind there, m/s, (n, 2) east and north.
     """
     positions, velocities = position.astype(np.float64), velocity.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Find the smallest battery with which a mission and all its returns keep the energy reserve, by many flights.
+"""Find the smallest battery with which a mission and all its returns to launch keep the reserve, by many flights.
 
 Each flight of a campaign is flown with a battery that does not run empty, and needs the largest of two energies: the
 energy used at the end of the mission, and the highest energy used at the end of any return to launch.  The capacity
@@ -50,7 +50,7 @@ _COMPLETED = "completed"
 
 @dataclass(frozen=True, slots=True)
 class BatteryGoal:
-    """Question of a search for a battery.
+    """Goal of a search for a battery.
 
     probability: probability with which the reserve is to be kept.
     confidence: confidence of the interval of the capacity.
@@ -70,13 +70,13 @@ class BatteryGoal:
 
 @dataclass(frozen=True, slots=True)
 class EnergyRow(FlightRow):
-    """Row of a flight with the energies that it needs.
+    """Row of a flight with the energies that it and its simulated returns to launch use.
 
     mission_energy: energy used at the end of the mission, Wh.
     return_energy: highest energy used at the end of a return, Wh; inf if a return does not reach its loiter, for
         example against the wind; NaN if no return's energy is known.
     return_time: start of this return, s.
-    return_leg: number of the leg on which this return starts, as in messages.
+    return_leg: number of the leg on which this return starts, as in messages; -1 without a return.
     leg_energies: energy used on each leg, Wh, by leg number; all legs around a loiter have one number.
     battery_factor: drawn factor on the battery's capacity.
     blocked_returns: number of returns that end at terrain, a zone or a threat; a larger battery would not help them.
@@ -93,7 +93,7 @@ class EnergyRow(FlightRow):
     unknown_returns: int = 0
 
     def required_capacity(self, reserve: float) -> float:
-        """Return the smallest nominal capacity that leaves a fraction of the battery unused, Wh.
+        """Return the smallest nominal capacity that leaves the reserve in this flight and its returns, Wh.
 
         It is inf if a return does not arrive with any battery, and NaN if an energy is unknown.
 
@@ -112,10 +112,12 @@ class EnergyRow(FlightRow):
 def fly_for_energy(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, interval: float, mass_factor: float
 ) -> EnergyRow:
-    """Fly one flight of a campaign with an endless battery, and simulate its returns.
+    """Fly one flight of a campaign with an endless battery, simulate its returns to launch, and return its row.
+
+    The row has no energies if the flight does not complete the mission.
 
     index: number of the flight, from 0.
-    wind: mean wind that replaces the scenario's wind, or None.
+    wind: mean wind that replaces the scenario's wind; None for the scenario's wind.
     interval: time between the starts of two returns, s.
     mass_factor: mass of the aircraft with its battery, relative to the stated mass.
     """
@@ -144,11 +146,11 @@ def fly_for_energy(
 
 
 def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: float) -> EnergyRow:
-    """Return a row with the energy and start of the return that needs the most energy.
+    """Return the row with energy and start of the simulated return to launch that needs the most energy.
 
-    Without a home the row is returned unchanged.  Returns are simulated with a point mass, which does not know the
-    drawn mass and drag, gusts and turns.  The energy of a return is therefore multiplied by the ratio of the flown
-    energy to the predicted energy in the mission of this flight.
+    Without a home the row is returned unchanged.  The point mass of a simulated return does not know the drawn mass and
+    drag, gusts and turns.  The energy of a return is therefore multiplied by a ratio from the mission of this flight:
+    its flown energy divided by its predicted energy.
     interval: time between the starts of two returns, s.
     """
     if varied.setup.mission.home is None:
@@ -185,9 +187,9 @@ class CapacityRange(NamedTuple):
 
 
 class BatteryDecision(NamedTuple):
-    """Part of the flight that needs the most energy, and the number of flights in which it does.
+    """Part that decides the capacity in some flights: the end of the mission, or the returns that start on one leg.
 
-    flights: number of flights.
+    flights: number of flights in which this part needs the most energy.
     leg: number of the leg on which the deciding return starts, as in messages; -1 for the end of the mission.
     time: median start of these returns, s; NaN for the end of the mission.
     """
@@ -203,7 +205,7 @@ class BatteryResult:
 
     capacity: smallest capacity that keeps the reserve with the probability, Wh; inf if no battery does, because returns
         do not arrive, or because the energy that it adds is needed for its own mass; NaN if it is unknown.
-    interval: its interval with the goal's confidence, Wh; its upper end is inf if there are too few flights.
+    interval: interval of `capacity` with the goal's confidence, Wh; its upper end is inf if there are too few flights.
     own_capacity: capacity of the aircraft's battery, Wh.
     is_guessed: True if the aircraft's model and the scenario state no capacity, so that `own_capacity` is only a guess.
     kept: number of flights in which the aircraft's own battery keeps the reserve, at the stated mass.
@@ -257,12 +259,12 @@ class BatteryResult:
 
     @property
     def known(self) -> tuple[EnergyRow, ...]:
-        """Flights that completed the mission and whose returns have known energies."""
+        """Rows of the flights that completed the mission, and whose returns have known energies."""
         return tuple(row for row in self.completed if not math.isnan(row.required_capacity(self.goal.reserve)))
 
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
-        """The end of the mission or returns from a leg, with the number of flights that it decides."""
+        """Parts that decide the capacity in some flights, the most frequent first."""
         # Key -1 stands for flights that are decided by the mission, not by a return.
         times_by_leg: dict[int, list[float]] = {}
         for row in self.completed:
@@ -276,7 +278,7 @@ class BatteryResult:
 
     @property
     def leg_energies(self) -> Floats:
-        """Median energy of each leg, Wh, (legs,), over the flights that complete the mission.
+        """Median energy of each leg number, Wh, (legs,), over the flights that complete the mission.
 
         The shape is (0,) if no flight completes the mission.
         """
@@ -344,7 +346,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 def fly_energy_campaign(
     base: CampaignBase, goal: BatteryGoal, workers: Workers, mass_factor: float, advance: Advance
 ) -> tuple[EnergyRow, ...]:
-    """Fly the flights of a campaign; return a row with the energies of each, in the order of the draws.
+    """Fly the flights of a campaign, and return their rows with the used energies, in the order of the draws.
 
     mass_factor: factor on the mass of the aircraft's model.
     advance: called after each flight with the number of flights done, their total and a text.

@@ -1,11 +1,10 @@
 """Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas.
 
-Each flight of a campaign gives two areas: the area below the flight and its returns to launch, and the area in which
-the aircraft can fall from them.  The flight geography is a corridor around the planned path and around the path of the
-flight without variations; it contains a fraction of the flights.  Contingency volume and ground risk buffer contain all
-flights, returns and falls, and the volumes by the formulas of SORA's annex A.  Each volume has one width along the
-whole
-path: the largest width that is needed anywhere.
+Each flight of a campaign gives two areas: the area below the flight and its simulated returns to launch (here:
+returns), and the area in which the aircraft can fall from them.  The flight geography is a corridor around the planned
+path and around the path of the flight without variations; it contains a fraction of the flights.  Contingency volume
+and ground risk buffer contain all flights, returns and falls, and the volumes by the formulas of SORA's annex A.  Each
+volume has one width along the whole path: the largest width that is needed anywhere.
 """
 
 import itertools
@@ -66,7 +65,7 @@ _COMPLETED = "completed"
 
 @dataclass(frozen=True, slots=True)
 class GroundRiskGoal:
-    """Question about the ground risk of a mission.
+    """Request for the ground risk of a mission.
 
     probability: fraction of the flights that the flight geography contains.
     flights: number of flights.
@@ -99,7 +98,7 @@ class ExcursionRow(FlightRow):
     return_height: largest height above ground in flight or in a return, m.
     ground_speed: highest speed over the ground, m/s.
     flown: area below the flight and its returns, on the map, m, as well-known binary (WKB).
-    fallen: area in which falls from the flight and its returns end, as `flown`.
+    fallen: area in which falls from the flight and its returns end, including `flown`, in the same format.
     """
 
     deviation: float = math.nan
@@ -114,15 +113,15 @@ class ExcursionRow(FlightRow):
 def fly_for_excursions(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
 ) -> ExcursionRow:
-    """Fly one flight of a campaign; find the area that it and its returns cross, and the area of falls.
+    """Fly one flight of a campaign and its returns; return its row with the area below them and the area of falls.
 
     index: number of the flight, from 0.
-    wind: mean wind that replaces the scenario's wind, or None.
+    wind: mean wind that replaces the scenario's wind; None for the scenario's wind.
     path: planned path, and path of the flight without variations, m.
     interval: time between the starts of two returns, s.
     glide: True to include the glide after an engine failure.
 
-    Without terrain, and for a flight that ends at its start, the row contains only the draw and how the flight ended.
+    Without terrain, and for a flight that ends at its start, the row contains only draw, outcome and reason of the end.
     """
     draw = draw_flight(base.dispersions, base.seed, index)
     varied = vary_flight(base, draw, wind)
@@ -137,7 +136,7 @@ def fly_for_excursions(
     terrain = setup.scenario.terrain
     if len(flown_mission.track) < 2 or terrain is None:
         return row
-    times, positions, velocities = _sampled_flight(flown_mission.track)
+    times, positions, velocities = _sample_flight(flown_mission.track)
     paths = _return_paths(setup, flown_mission.track, interval, glide=glide)
     uav = varied.uav.aircraft
     # Positions of flight and returns, and ground velocities, (n, 3) each; a return is sampled at every
@@ -186,8 +185,8 @@ def fly_for_excursions(
     )
 
 
-def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
-    """Sample a track every `_SAMPLE_INTERVAL_S`, and at its end.
+def _sample_flight(track: Track) -> tuple[Floats, Floats, Floats]:
+    """Sample a track every `_SAMPLE_INTERVAL_S`, and at its end; rows that are not finite are left out.
 
     Return times, s, (n,), positions, m, (n, 3), and ground velocities, m/s, (n, 3).
     """
@@ -201,7 +200,7 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
 
 
 class _ReturnPaths(NamedTuple):
-    """Paths of the returns from a flight, in order of their starts.
+    """Paths of the simulated returns to launch from a flight, in the order of their starts.
 
     times: start time of each return, s, (n,).
     returns: positions of each return, m, (k, 3).
@@ -218,10 +217,10 @@ class _ReturnPaths(NamedTuple):
 
 
 def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: bool) -> _ReturnPaths:
-    """Return the paths of the returns from a track; a mission without home has no returns.
+    """Simulate the returns to launch from a track, and give their paths; there are none for a mission without home.
 
     interval: time between the starts of two returns, s.
-    glide: True to simulate also returns after an engine failure; the paths of those that reach the ground are returned.
+    glide: True to simulate also returns after an engine failure; only their glides that reach the ground are kept.
     """
     no_returns = _ReturnPaths(np.zeros(0), [], [], [], [])
     if setup.mission.home is None:
@@ -269,14 +268,14 @@ def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
 def turn_areas(
     times: Floats, positions: Floats, start_times: Floats, turns: list[Floats], interval: float
 ) -> list[BaseGeometry]:
-    """Return the areas of the turns of all returns that may start between the simulated starts.
+    """Return areas that contain the first turns of all returns that may start between two simulated returns.
 
-    Each area is the path flown between two successive starts, widened to both sides by the larger of their two turns.
+    Each area is the path flown between two successive starts, widened by the larger extent of their turns from it.
 
     times, positions: times, s, (n,), and positions, m, (n, 3), of the flight.
     start_times: times of the returns' starts, s, (m,).
-    turns: positions in the turn of each return, m, (k, 3).
-    interval: time covered after the last start, s.
+    turns: positions of each return in its first turn, m, (k, 3).
+    interval: time after the last start over which returns may start, s.
     """
     areas = []
     for k, (start, end) in enumerate(itertools.pairwise([*start_times, *(start_times[-1:] + interval)])):
@@ -291,7 +290,7 @@ def turn_areas(
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
     """Return an area for each pair of successive returns, bounded by the paths of the two.
 
-    It contains the returns that start between the two.
+    It is taken to contain the returns that start between the two.
 
     paths: positions of each return, m, (k, 3).
     """
@@ -365,7 +364,7 @@ class GroundRiskResult:
 
     @property
     def lost(self) -> int:
-        """Number of flights that could not be flown."""
+        """Number of flights that have no row, because they could not be flown."""
         return self.goal.flights - len(self.rows)
 
     @property
@@ -390,12 +389,12 @@ class GroundRiskResult:
 
     @property
     def ballistic_buffer(self) -> float:
-        """Width of the ground risk buffer by a fall without drag, m; for comparison only."""
+        """Width of the ground risk buffer for a fall without drag, m; for comparison only."""
         return ballistic_buffer(self.volume_height, self.aircraft.wing_span, self.speed)
 
     @property
     def glide_buffer(self) -> float | None:
-        """Width of the ground risk buffer by a glide, m; None if glides are not requested."""
+        """Width of the ground risk buffer for an unpowered glide, m; None if glides are not requested."""
         return None if self.glide_ratio is None else glide_buffer(self.volume_height, self.glide_ratio)
 
     @property
@@ -405,7 +404,10 @@ class GroundRiskResult:
 
     @property
     def is_judged(self) -> bool:
-        """True if the class is known, or known to be outside SORA; False without a home for returns."""
+        """True if the ground risk class is decided, also if the decision is that the operation is not part of SORA.
+
+        It needs a home for the returns, and a controlled ground area or population data for the whole footprint.
+        """
         is_populated = self.goal.controlled or (self.population is not None and self.population.is_complete)
         return is_populated and self.base.mission.home is not None
 
@@ -421,7 +423,7 @@ class GroundRiskResult:
 
 
 def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers, advance: Advance) -> GroundRiskResult:
-    """Find the volumes of a mission, and its ground risk class if the population is known.
+    """Fly a campaign to find the volumes of a mission, and its ground risk class if it can be judged.
 
     Raises ScenarioError without terrain, FlightError if no flight can be flown, and PlanflyError for a population
     raster that cannot be used.
@@ -460,9 +462,9 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
 
 
 def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
-    """Return a result with the population of its footprint and its ground risk class.
+    """Return a result with the population of its footprint and its ground risk class added.
 
-    The class stays None if the population is not known.
+    The class stays None if the result is not judged, see `GroundRiskResult.is_judged`.
 
     Raises PlanflyError for a population raster that cannot be used.
     """
@@ -481,7 +483,7 @@ def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
 
 
 def nominal_path(base: CampaignBase) -> BaseGeometry:
-    """Return the nominal paths on the map, m: the flight without variations, and the planned route.
+    """Return the two nominal paths on the map, m: the flight without variations, and the planned path.
 
     Raises FlightError if the flight ends where it starts.
     """
@@ -489,16 +491,16 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
     track = fly_to_end(Flight(setup, base.uav.aircraft)).track
     if len(track) < 2:
         raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
-    _, positions, _ = _sampled_flight(track)
+    _, positions, _ = _sample_flight(track)
     return shapely.MultiLineString([positions[:, :2], setup.route.positions[:, :2]]).simplify(0.1)
 
 
 def _fly_excursions(
     base: CampaignBase, goal: GroundRiskGoal, path: BaseGeometry, workers: Workers, advance: Advance
 ) -> tuple[ExcursionRow, ...]:
-    """Fly the flights of a campaign, and return rows with their areas, in the order of the draws.
+    """Fly the flights of a campaign, and return their rows in the order of the draws.
 
-    A flight without such areas, or whose worker died, has no row.
+    A flight that ended at its start, or whose worker died, is left out.
 
     path: planned path, and path of the flight without variations, m.
     Raises FlightError if no flight could be flown.
@@ -578,5 +580,5 @@ def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGe
 
 
 def _distance_beyond(outer: BaseGeometry, inner: BaseGeometry) -> float:
-    """Return the largest distance by which an area extends beyond another area, m; 0 for an empty area."""
+    """Return the largest distance from the outline of an outer area to an inner area, m; 0 for an empty outer area."""
     return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max(initial=0.0))

@@ -30,11 +30,13 @@ DEFAULT_SPAN = timedelta(hours=24)
 
 @dataclass(frozen=True, slots=True)
 class WindowGoal:
-    """Question of a search for a departure window.
+    """Goal of a search for a departure window.
+
+    A departure is open if its fraction of flyable flights is at least `probability`.
 
     departures: times of take-off, ascending.
     asked: requested time of take-off; None if any departure will do.
-    probability: probability of a flyable flight at which a departure is open.
+    probability: required probability of a flyable flight.
     flights: number of flights of each departure.
     zone: offset from UTC in which the user stated the times.
     """
@@ -48,7 +50,7 @@ class WindowGoal:
 
 @dataclass(frozen=True)
 class Departure:
-    """Flights of one time of take-off.
+    """Flights that take off at one time.
 
     time: time of take-off.
     scenarios: scenario at this time in each member of the forecast; () if the forecast does not cover the flight.
@@ -88,7 +90,7 @@ class Departure:
 
     @property
     def undecided(self) -> int:
-        """Number of flights that are not judged in full."""
+        """Number of flights in which some rule is not judged."""
         return sum(row.undecided for row in self.rows)
 
     def is_judged_in_full(self, probability: float) -> bool:
@@ -143,7 +145,7 @@ class WindowResult:
 
     @property
     def windows(self) -> tuple[tuple[datetime, datetime], ...]:
-        """First and last departure of each run of open departures."""
+        """Times of the first and the last departure of each uninterrupted series of open departures."""
         open_windows: list[tuple[datetime, datetime]] = []
         was_open = False
         for departure in self.departures:
@@ -185,7 +187,9 @@ class WindowResult:
 def departure_times(
     first: datetime, last: datetime, step: timedelta, asked: datetime | None = None
 ) -> tuple[datetime, ...]:
-    """Return the departure times from the first to the last, including the requested departure.
+    """Return the departure times, ascending: every `step` from `first` up to `last`, and the requested time.
+
+    asked: requested time of take-off; None if any departure will do.
 
     >>> day = datetime(2026, 5, 1, tzinfo=UTC)
     >>> [time.hour for time in departure_times(day, day + timedelta(hours=5), timedelta(hours=2))]
@@ -199,7 +203,10 @@ def departure_times(
 def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance: Advance) -> WindowResult:
     """Fly a campaign for each departure; the draws of flight k are the same at every departure.
 
-    If the forecast is an ensemble, flight k flies in member k modulo the number of members.
+    If the forecast is an ensemble, flight k flies in member k modulo the number of members.  A departure that the
+    forecast does not cover is not flown, and states the reason.
+
+    advance: called after each flight with the number of flights done, their total and a text.
     """
     departures = []
     for time in goal.departures:
@@ -266,7 +273,7 @@ def fly_departure(
 def last_departure(base: CampaignBase, first: datetime) -> datetime:
     """Return the default end of a search: `DEFAULT_SPAN` after the first departure.
 
-    If the forecast ends before, it is the last departure whose flight the forecast covers, but never before the first.
+    If the forecast ends earlier, it is the last departure whose flight the forecast covers, but never before the first.
     """
     forecast_end = first + DEFAULT_SPAN
     if base.scenario.wind.forecast is not None:

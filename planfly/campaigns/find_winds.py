@@ -83,8 +83,9 @@ DEFAULT_WINDS_GOAL = WindsGoal(target=0.99, confidence=0.95, directions=16, most
 def make_winds_goal(requested: Mapping[str, float | None], folder: Path, *, resume: bool) -> WindsGoal:
     """Return the goal of a search for winds.
 
-    requested: values of the goal's fields; for None, the value is that in the folder of a resumed search, or else the
-        default.
+    requested: values of the goal's fields by name; for None, a resumed search keeps its stored value, and a new search
+        has the default.
+    folder: folder of the search, which is read only to resume it.
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     settings = read_stored_settings(folder / WINDS_DATABASE) if resume else {}
@@ -125,14 +126,14 @@ class WindsResult:
     """Result of a search: the boundary of each direction, and the flights from which the boundaries are estimated.
 
     boundaries: boundary of each direction; `judged` and `reasons` state which of them are only estimates, and why.
-    flights: index of the direction, wind speed, m/s, and True if flyable, for each flight.
+    flights: for each flight, the index of its direction, the wind speed, m/s, and True if it was flyable.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights, without the wind, which depends on the direction.
     calm: failures in calm air if the mission is not flyable in calm air with the target probability; None otherwise.
     failures: for each direction, the failures, by rule and place, of its flights in winds up to the upper bound of its
         boundary; () if no wind was searched.
-    undecided: index of each flight that is not judged in full, and its rules and reasons; it is neither flyable nor
-        a failure.
+    undecided: index of each undecided flight, with the rules that are not judged and the reasons.  An undecided flight
+        has no failure, but is not known to be flyable.
     """
 
     goal: WindsGoal
@@ -145,24 +146,27 @@ class WindsResult:
     undecided: tuple[tuple[int, str], ...] = ()
 
     def from_deg(self, direction: int) -> float:
-        """Return the direction from which the wind blows, degrees.  direction: index of the direction."""
+        """Return the bearing from which the wind of a direction blows, degrees.
+
+        direction: index of the direction.
+        """
         return 360.0 * direction / self.goal.directions
 
     def flight_counts(self) -> list[int]:
-        """Return the number of flights of each direction."""
+        """Return the number of flights for each direction."""
         counts = Counter(direction for direction, _, _ in self.flights)
         return [counts[direction] for direction in range(len(self.boundaries))]
 
     def undecided_counts(self) -> list[int]:
-        """Return the number of flights of each direction that are not judged in full."""
+        """Return the number of undecided flights for each direction."""
         counts = Counter(self.flights[number][0] for number, _ in self.undecided)
         return [counts[direction] for direction in range(len(self.boundaries))]
 
     @property
     def flown_bounds(self) -> tuple[tuple[float | None, float | None], ...]:
-        """For each direction, the strongest wind without failures up to it and the weakest with one, m/s.
+        """For each direction, the strongest flyable wind below any failure, and the weakest wind with a failure, m/s.
 
-        Each is None if there is no such wind.  Flights that are lost or not judged in full are left out.
+        Each is None if there is no such wind.  Lost and undecided flights are left out.
         """
         left_out = {*self.lost, *(number for number, _ in self.undecided)}
         bounds = []
@@ -220,7 +224,7 @@ class WindsResult:
 
     @property
     def estimated(self) -> tuple[bool, ...]:
-        """True for each direction whose boundary is stated: it is judged, or only its interval is too wide.
+        """True for each direction whose boundary is stated, because it is judged, or only its interval is too wide.
 
         Otherwise there are too few flights, so that boundary and interval depend mostly on assumptions, or some flights
         are not judged in full and may lie on either side of the boundary.
@@ -284,7 +288,7 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsResult:
-    """Fly rounds of flights until the boundary of each direction is accurate enough.
+    """Fly rounds of flights until the boundary of each direction is accurate enough, and return the boundaries.
 
     At most `goal.flights` flights are flown.
 
@@ -294,6 +298,9 @@ def find_winds(
     Flights completed before an error or Ctrl-C stay in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
+    store: table of the search, which may already contain flights.
+    advance: called with the progress; None if it is not reported.
+    fly: function that flies one flight of the campaign.
     """
     search, stored_flights = _Search(goal, base), _StoredFlights(store)
     progress = _ProgressReport(search, len(stored_flights.flown), advance)
@@ -349,7 +356,10 @@ class _Search:
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
     def next_round(self) -> list[RequestedFlight]:
-        """Return the requests of the next round; empty if the search is complete or all flights are used."""
+        """Close the directions that need no more flights; return the requests of the next round for the others.
+
+        The list is empty if all directions are closed, or if `goal.flights` flights were flown.
+        """
         remaining_directions = []
         for number in self.open_directions:
             direction = self.directions[number]
@@ -394,21 +404,24 @@ class _Search:
             self.lost.append(request.number)
 
     def make_request(self, requested_flight: RequestedFlight) -> FlightRequest:
-        """Make the request to a worker for a flight of the search."""
+        """Return the request that a worker receives for a flight of the search."""
         return FlightRequest(
             requested_flight.draw,
             GivenWind(requested_flight.speed, 360.0 * requested_flight.direction / self.goal.directions),
         )
 
     def min_remaining_flights(self) -> int:
-        """Return the number of flights still needed to reach the minimum number in each open direction."""
+        """Return the number of flights still needed to reach the minimum number in each open direction.
+
+        It is at most the number of flights that the goal still permits.
+        """
         remaining = sum(
             max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open_directions
         )
         return min(remaining, self.goal.flights - len(self.flown))
 
     def result(self) -> WindsResult:
-        """Return the result of the search so far: boundaries, flights and the failures of each direction."""
+        """Return the result of the flights so far: boundaries, flights and the failures of each direction."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         # Failures in the weakest flown wind of the directions whose boundary is calm air.
@@ -456,7 +469,10 @@ class _Search:
         )
 
     def result_in_calm_air(self, rows: Sequence[FlightRow]) -> WindsResult:
-        """Return the result of a search that ends after its flights in calm air.  rows: these flights."""
+        """Return the result of a search that ends after its flights in calm air.
+
+        rows: these flights, none of which was flyable.
+        """
         # In each direction, the boundary and both ends of its interval are calm air.
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * len(rows)
@@ -467,7 +483,7 @@ class _Search:
 
 
 def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
-    """Fly the first draws in calm air; return their rows if none is flyable, otherwise [].
+    """Fly the first draws in calm air; return their rows if no flight is flyable, otherwise [].
 
     The number of flights is large enough to disprove the target: a mission with the target probability fails all of
     them with a probability of at most 1 minus the confidence.  [] is also returned if a flight could not be flown, or
@@ -495,7 +511,7 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:
-    """Return a hashable key for a failed rule and place, without item numbers and names."""
+    """Return the failure mode of a failed rule: a key of the rule and the place, without item numbers and names."""
     return rule, place.kind, place.index
 
 
@@ -524,7 +540,7 @@ class _StoredFlights:
         return [request for request in requests if request.number not in self.flown]
 
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
-        """Write a flight to the table."""
+        """Write a flown flight to the table, and add it to `flown`."""
         self._store.add(request, row)
         self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.marginal_passes, row.undecided_text)
 
@@ -533,29 +549,30 @@ class _ProgressReport:
     """Periodic progress report of a search.
 
     stored_count: number of flights in the table at the start.
+    advance: function called with each report; None if nothing is reported.
     """
 
     def __init__(self, search: _Search, stored_count: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(stored_count)
 
     def report_start(self, flight_count: int) -> None:
-        """Report the minimum number of flights before the first flight."""
+        """Report, before the first flight, the number of flights in the table and the minimum number of flights."""
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
             remark = f"{flight_count} of {count_text(total, 'flight')} at least"
             self._advance(float(flight_count), float(total), remark)
 
     def report_calm(self, flight_count: int) -> None:
-        """Report the flights in calm air after which a search ends."""
+        """Report the number of flights in calm air, if a search ends after them."""
         if self._advance is not None:
             text = f"{count_text(flight_count, 'flight')} in calm air, none of them flyable"
             self._advance(float(flight_count), float(flight_count), text)
 
     def report(self, flight_count: int, force: bool = False) -> None:
-        """Report the settled directions, the number and rate of flights, and a lower bound of the remaining time.
+        """Report the number of closed directions, the number and rate of flights, and the least remaining time.
 
-        If each open direction has `MIN_FLIGHTS_PER_DIRECTION` flights, the number of further flights is unknown. Then
-        no remaining time is given.
+        No remaining time is given once each open direction has `MIN_FLIGHTS_PER_DIRECTION` flights, because the number
+        of further flights is then unknown.
 
         force: True to report even if no report is due.
         """

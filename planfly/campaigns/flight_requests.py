@@ -16,7 +16,7 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from world.errors import PlanflyError
 
-# Function that flies flight k of a base in a given wind; all campaigns use `fly_one`.
+# Function that flies the flight with an index in a given wind, or in the base's wind; most campaigns use `fly_one`.
 FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
 
 # Reason for the end of a flight that could not be flown.
@@ -29,8 +29,8 @@ MAX_WORKER_DEATHS = 3
 class FlightRequest:
     """Requested flight.
 
-    index: number of the flight's draw.
-    wind: mean wind that replaces the scenario's wind, or None.
+    index: index of the flight, which determines its draw.
+    wind: mean wind that replaces the scenario's wind; None for the scenario's wind.
     """
 
     index: int
@@ -72,6 +72,8 @@ def code_hash() -> str:
 def fingerprint(aircraft: str) -> dict[str, str]:
     """Return the software versions and hashes that determine a flight on this machine, keyed by name.
 
+    aircraft: name of the aircraft.  If it cannot be loaded, "model" is "none: " and the reason instead of a hash.
+
     >>> sorted(fingerprint("aerosonde"))
     ['jsbsim', 'model', 'numba', 'numpy', 'planfly', 'python', 'scipy', 'sources']
     """
@@ -106,9 +108,10 @@ def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[
 
 
 class CampaignCopy:
-    """Campaign packed for its workers; each worker unpacks it once.
+    """Pickled campaign; each worker unpickles it once, after a check of its own software.
 
     own_fingerprint: `fingerprint` of the process that leads the campaign.
+    fly: function that flies one flight of the campaign.
     """
 
     def __init__(self, base: CampaignBase, own_fingerprint: dict[str, str], fly: FlyOne = fly_one) -> None:
@@ -118,13 +121,18 @@ class CampaignCopy:
         self._unpacked: tuple[CampaignBase, FlyOne] | None = None
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
-        """Fly the requested flight on this worker. Raises WorkerError if this worker's software differs."""
+        """Fly the requested flight on this worker, and return its row with the worker's name.
+
+        worker: name of this worker.
+        Raises WorkerError if this worker's software differs.
+        """
         base, fly = self.unpack(worker)
         return replace(fly(base, request.index, request.wind), worker=worker)
 
     def unpack(self, worker: str) -> tuple[CampaignBase, FlyOne]:
-        """Return the campaign and the function that flies a flight; unpack them at the first call.
+        """Return the campaign's base and the function that flies a flight; unpickle them at the first call.
 
+        worker: name of this worker for the message of an error.
         Raises WorkerError if this worker's software differs.
         """
         if self._unpacked is None:

@@ -201,13 +201,13 @@ _FAILED_FINDINGS = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_f
 class FlightRow:
     """Row of a flight in the campaign's table; each field ``Annotated`` with a `Column` is a column.
 
-    The draw has one column for each quantity. The margins have two columns for each rule, and one for the closeness.
+    The draw has one column for each quantity. The margins have two columns for each rule, and one for `closeness`.
     The tables of `planfly.campaigns.tables` are derived from this class.
 
     ended: "completed", or the reason why the flight ended early.
     failed: rule and place of each failed finding, in the verdict's order; for an undecided flight, rule and place of
     the findings that leave it undecided.
-    undecided_text: rules that leave an undecided flight undecided, with their reasons; "" for any other.
+    undecided_text: rules that leave the flight undecided, with their reasons; "" for a flight that is not undecided.
     margins: minimum margin of each judged rule whose margin has a scale.
     missile_distance: smallest distance outside a missile's sphere, m, negative inside; None if nothing was flown or
     there are no missiles.
@@ -219,7 +219,7 @@ class FlightRow:
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
     marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
-    undecided: True if the flight is not judged in full, also if it flies; the tables do not store it.
+    undecided: True if some rule is not judged, even if the outcome is "flyable"; the tables do not store it.
     unjudged: rules that are not judged in a flight without failures, with places and reason as in the verdict's
     summary; the tables do not store them.
     """
@@ -244,7 +244,7 @@ class FlightRow:
 
     @property
     def closeness(self) -> float:
-        """Minimum of all scaled margins; inf if no margin is known. Flights are sorted by it."""
+        """Smallest ratio of a margin to the scale of its rule, by which flights are sorted; inf if none is known."""
         fractions = (fraction for rule, margin in self.margins if (fraction := scale_margin(rule, margin)) is not None)
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 
@@ -275,8 +275,8 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     """Fly one flight of a campaign, and return its row.
 
     index: number of the flight, from 0.
-    wind: mean wind that replaces the scenario's wind, or None.
-    log: file for the recording, or None for no recording.
+    wind: mean wind that replaces the scenario's wind; None for the scenario's wind.
+    log: file for the recording; None for no recording.
     """
     start_time = time.perf_counter()
     draw = draw_flight(base.dispersions, base.seed, index)
@@ -319,7 +319,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str, str], ...]:
-    """Return the rules that a verdict does not judge, each with a text on places and reason.
+    """Return the rules that a verdict does not judge, each with a text that names the places and the reason.
 
     Returns () if a rule failed.
     """
@@ -332,7 +332,7 @@ def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str
 
 
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Return the rule and the place of each failed finding.
+    """Return the rule and the place of each failed finding of a verdict.
 
     If a flight without failed findings is not flyable, the undecided findings that prevent it are returned, or else the
     rule `completion`.
@@ -349,10 +349,10 @@ def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:
-    """Return the smallest margin of each judged rule with its tolerance, in the order of the verdict.
+    """Return the smallest margin of each judged rule and its place, in the order of the verdict.
 
-    A margin is therefore negative only if the rule fails.  The margin of the rule `threat` is the distance outside the
-    nearest missile's sphere.
+    The tolerance is added to a margin, which is therefore negative only if the rule fails.  The margin of the rule
+    `threat` is the distance outside the nearest missile's sphere.  Rules without a scale or a known margin are omitted.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
@@ -378,5 +378,9 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
 
 
 def make_lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
-    """Return the row of a flight with the outcome "lost", because it could not be flown."""
+    """Return the row of a flight with the outcome "lost", because it could not be flown.
+
+    index: index of the flight.
+    reason: reason for the end of the flight, such as `LOST_REASON`.
+    """
     return FlightRow(draw_flight(base.dispersions, base.seed, index), "lost", reason)

@@ -17,7 +17,7 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass
 class _FlightTally:
-    """The known flights of a campaign; flights are counted in the order of their indices.
+    """Known flights of a campaign, which are tallied in the order of their indices.
 
     tally: outcomes of the flights before the first missing index.
     later_outcomes: outcomes of the known flights after the first missing index.
@@ -33,9 +33,9 @@ class _FlightTally:
     is_decided: bool = False
 
     def add(self, index: int, outcome: str) -> None:
-        """Add the outcome of a flight, and count all flights before the first missing index.
+        """Add the outcome of a flight, and tally all flights before the first missing index.
 
-        Set `is_decided` as soon as the counted flights decide the goal.
+        Set `is_decided`, and tally no further flights, as soon as the tally decides the goal.
         """
         self.later_outcomes[index] = outcome
         while not self.is_decided and (next_outcome := self.later_outcomes.pop(self.tally.flown, None)) is not None:
@@ -45,9 +45,9 @@ class _FlightTally:
             self.is_decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def next_request(self) -> FlightRequest | None:
-        """Return the request of the next missing flight, or None if no flight has to be requested.
+        """Return the request of the next missing flight.
 
-        None is returned if the goal is decided, or if all flights have been requested.
+        Return None if the goal is decided, or if all flights have been requested.
         """
         self.next_index = max(self.next_index, self.tally.flown)
         while self.next_index in self.later_outcomes:
@@ -68,8 +68,10 @@ def resumed_goal(
 ) -> Goal:
     """Return the goal of a resumed campaign: the requested goal, with parts of the stored goal.
 
+    Its `changed` is set if the number of flights, or the rule to stop, differs from the stored goal.
+
     confidence: confidence of the goal; None keeps the stored confidence.
-    keeps_target: True keeps the stored target, and whether the flights stop when it is decided.
+    keeps_target: True keeps the stored target and `stops`.
     keeps_flights: True keeps the stored number of flights, if both goals have a fixed number or both stop by
         themselves.
     Raises StoreError for a folder without a campaign.
@@ -110,9 +112,9 @@ def fly_campaign(
 ) -> Estimate:
     """Fly the flights missing from the table until the number of flights is reached or the goal is decided.
 
-    Flights are counted in the order of their indices, and flights after the deciding flight are deleted.  Answer and
-    table therefore do not depend on the speed of the workers.  Flights completed before an error or Ctrl-C stay in the
-    table.
+    Return the estimate of the probability of a flyable flight.  Flights are tallied in the order of their indices, and
+    flights after the deciding flight are deleted.  Answer and table therefore do not depend on the speed of the
+    workers.  Flights completed before an error or Ctrl-C stay in the table.
 
     store: the campaign's table, which may already hold flights.
     advance: function called with the progress; None if it is not reported.
@@ -142,6 +144,7 @@ class _ProgressReport:
     """Periodic progress report of a campaign.
 
     stored_tally: tally of the flights in the table at the start.
+    advance: function called with each report; None if nothing is reported.
     """
 
     def __init__(self, goal: Goal, estimator: Estimator, stored_tally: Tally, advance: Advance | None) -> None:
@@ -154,13 +157,16 @@ class _ProgressReport:
             advance(float(stored_tally.flown), float(total), remark)
 
     def start_timing(self, stored_tally: Tally) -> None:
-        """Start measuring the rate of flights; called when the workers are ready."""
+        """Start measuring the rate of new flights, once the workers are ready.
+
+        stored_tally: tally of the flights flown before, which are not part of the rate.
+        """
         self._rate = FlightRate(stored_tally.flown)
 
     def _min_total_flights(self, tally: Tally) -> int:
         """Return the smallest number of flights with which the campaign can end.
 
-        It is the requested number, unless the campaign stops as soon as its answer is certain.
+        It is the requested number, unless the campaign stops as soon as its goal is decided.
         """
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 

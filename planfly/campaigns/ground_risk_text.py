@@ -34,12 +34,12 @@ def answer_line(result: GroundRiskResult) -> str:
 
 
 def density_text(population: Population | None) -> str:
-    """Return the highest population density as text."""
+    """Return the highest population density of the footprint as text; None gives "population unknown"."""
     return "population unknown" if population is None else f"at most {format_density(population.max_density)}"
 
 
 def _unknown_reason(result: GroundRiskResult) -> str:
-    """Return the reason why the class is not judged."""
+    """Return the reason why the class of a result is not judged; the result must not be judged."""
     if result.base.mission.home is None:
         return "the mission has no home, so its returns, which enlarge the volumes, were not simulated"
     if result.population is None:
@@ -212,7 +212,7 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
 
 
 def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the table's rows of the population and the ground risk class."""
+    """Return the last rows of the table: population, row and column of SORA's table, and ground risk class."""
     rows = [("**intrinsic ground risk class**", "", "")]
     population = result.population
     if population is not None:

@@ -28,7 +28,8 @@ def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     """Return a text on the failed landings of a plan with a steep final; () if the landings succeed.
 
     Landings succeed if at least a fraction `HOLDING_PROBABILITY` is flyable.  They begin in the air before the line-up,
-    with the default dispersions of a campaign.  A plan with a gentler final is not flown.
+    with the default dispersions of a campaign.  Landings are not flown, and () is returned, for a plan that is not
+    safe, has no landing, or has a final of at most `STEEP_FINAL_RAD`.
     """
     descent = None if plan.procedures is None else plan.procedures.descent
     if not plan.safe or descent is None or math.atan(descent.slope) <= STEEP_FINAL_RAD:
@@ -48,7 +49,10 @@ def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def landing_mission(mission: Mission) -> Mission:
-    """Return the end of a plan's mission: the waypoints before the line-up, the line-up and the landing."""
+    """Return the end of a plan's mission: the last waypoint before the line-up, the line-up and the landing.
+
+    The items are numbered from 1.
+    """
     landing_index = max(k for k, item in enumerate(mission.items) if item.command == Command.NAV_LAND)
     waypoints = [k for k in range(landing_index) if mission.items[k].command == Command.NAV_WAYPOINT]
     items = mission.items[waypoints[-min(len(waypoints), _WAYPOINTS_BEFORE_LANDING)] :]

@@ -78,11 +78,11 @@ class _Worker:
 
     @property
     def has_started(self) -> bool:
-        """True if the last process has started its first flight."""
+        """True if the latest process has started and received the campaign."""
         return self._start_future.done() and self._start_future.exception() is None
 
     def close(self) -> None:
-        """Free the semaphores of a worker whose process has ended."""
+        """Shut down the executor of a process that has ended, which frees its semaphores."""
         if self._pool is not None:
             # The thread that manages the pool keeps its semaphores until the thread ends.
             self._pool.shutdown(cancel_futures=True)
@@ -102,7 +102,8 @@ class LocalPool:
     """Processes on this machine that fly the flights of a campaign.
 
     count: number of processes.
-    fly: function that flies a flight.
+    base: inputs that all flights of the campaign share.
+    fly: function that flies one flight of the campaign.
     """
 
     def __init__(self, count: int, base: CampaignBase, fly: FlyOne = fly_one) -> None:
@@ -119,7 +120,11 @@ class LocalPool:
         """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order.
 
         next_request: returns the next request, or None while no request is ready; called again after each flight.
-        Raises the `world.errors.PlanflyError` of a flight, and OSError if no process can be started.
+        The iteration ends when no request is ready and no flight is in progress.  A flight that ended the processes of
+        `MAX_WORKER_DEATHS` workers is yielded as lost.
+
+        Raises a `world.errors.PlanflyError` that a flight raised, RuntimeError for any other error of a flight, and
+        OSError if no process can be started.
         """
         idle_workers = list(self._workers)
         flying: dict[Future[FlightRow], tuple[_Worker, FlightRequest]] = {}
@@ -153,8 +158,7 @@ class LocalPool:
     def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
         """Return the row of a flight, or None if its process has died.
 
-        Raises the PlanflyError of a flight or of `check_script_guard`.  Raises RuntimeError for any other error of a
-        flight, and OSError if processes repeatedly die at their start.
+        Raises as `fly`, and the PlanflyError of `check_script_guard`.
         """
         try:
             row = future.result()

@@ -80,7 +80,10 @@ def render_page(template: str, **values: object) -> str:
 
 
 def draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return HTML with a figure in a wide and a narrow layout; the figure is changed to the narrow layout."""
+    """Return HTML with a figure in a wide and a narrow layout; the figure itself is changed to the narrow layout.
+
+    caption: text alternative of the figure.
+    """
     wide_svg = page_svg(figure, caption)
     narrow_svg = page_svg(narrow_figure(figure), f"{caption} (narrow)")
     return Markup(f'<div class="wide">{wide_svg}</div><div class="narrow">{narrow_svg}</div>')

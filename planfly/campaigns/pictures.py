@@ -41,9 +41,9 @@ MAX_BARS = 14
 
 
 def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
-    """Draw a bar chart of the failed flights for each rule and place, the most frequent first.
+    """Draw a bar chart of the failed flights for each rule and place, the most frequent first, at most `MAX_BARS`.
 
-    counts: title of the rule, description of the place, and number of flights.
+    counts: for each rule and place, the rule's title, the place in words, and the number of flights that failed there.
     flights: total number of flights.
     """
     with clean_style():
@@ -96,7 +96,7 @@ class SpeedBin:
 
     low, high: range of wind speeds, m/s.
     flights, flyable: number of flights and of flyable flights.
-    interval: Wilson's interval of their ratio.
+    interval: Wilson's interval of the flyable fraction.
     """
 
     low: float
@@ -125,7 +125,7 @@ def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float 
 
     speed: wind speed of each flight, m/s, (n,).
     flyable: True for a flyable flight, (n,).
-    confidence: level of the Wilson interval of the flyable fraction.
+    confidence: confidence of the interval of the flyable fraction.
 
     >>> [one.flights for one in group_by_speed(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
     [2, 1]
@@ -205,6 +205,7 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
     """Draw a tornado chart: the fraction of the deciding margin's variance that each quantity explains.
 
     A bar points to the right if an increase of the quantity increases the margin.
+    bars: the quantities, from top to bottom.
     rule_title: title of the rule with the deciding margin.
     """
     with clean_style():
@@ -310,9 +311,9 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
-    """Draw a panel for each waypoint with the positions at which flights crossed it, seen along the path.
+    """Draw a panel for each waypoint with the positions at which flights passed it, seen along the path.
 
-    The panels show the ellipse of 95 % of the flights.
+    Each panel shows the 95 % ellipse of `covariance_ellipse`.
 
     crossings: distance right of and above each waypoint, m, (n, w, 2); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,).
@@ -382,14 +383,14 @@ def covariance_ellipse(points: Floats) -> Ellipse:
 
 @dataclass(frozen=True)
 class ChartDirection:
-    """Direction of the chart.
+    """Wind direction of the chart.
 
     from_deg: direction from which the wind blows, degrees.
     boundary: estimate of the strongest wind with the target probability, m/s.
     low, high: interval of the boundary, m/s.
     is_beyond_search: True if the boundary is beyond the maximum wind of the search.
-    flights: wind speed, number of flights and number of flyable flights, for the marks.
-    is_judged: True if there are enough flights to judge the direction.
+    flights: for each mark, the wind speed, m/s, the number of flights and the number of flyable flights.
+    is_judged: True if the boundary of the direction is judged.
     """
 
     from_deg: float
@@ -414,9 +415,12 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
+    """Draw a polar chart, north up, of the winds in which a mission is flyable.
 
+    directions: boundary and flights of each wind direction, clockwise from north.
+    max_speed: maximum wind of the search, at the edge of the chart, m/s.
     target, confidence: required probability of a flyable flight, and confidence of the boundaries' intervals.
+    name: name of the mission, for the title.
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
     with clean_style():
@@ -509,7 +513,7 @@ def _draw_legend(
 ) -> None:
     """Draw the legend of the go/no-go chart, with entries only for what the chart shows.
 
-    target, confidence, wind: as in `draw_go_no_go`.
+    directions, target, confidence, wind: as in `draw_go_no_go`.
     open_edge: maximum wind of the search, m/s, if a judged boundary is beyond it, otherwise None.
     """
     from matplotlib.lines import Line2D
@@ -643,7 +647,10 @@ def narrow_figure(figure: Figure) -> Figure:
 
 
 def _move_legends(figure: Figure, legends: Sequence[Legend], columns: int) -> None:
-    """Move legends to the lower left corner of a figure."""
+    """Replace each legend by one with the same entries in the lower left corner of the figure.
+
+    columns: number of columns of the new legend.
+    """
     for legend in legends:
         labels = [text.get_text() for text in legend.get_texts()]
         handles = [handle for handle in legend.legend_handles if handle is not None]
@@ -653,7 +660,10 @@ def _move_legends(figure: Figure, legends: Sequence[Legend], columns: int) -> No
 
 
 def _narrow_map(figure: Figure) -> Figure:
-    """Change a map to a narrow layout: colour bar, compass and notes in a row below it, then the legend."""
+    """Change a map to a narrow layout, and return it.
+
+    Colour bar, compass and notes form a row below the map, with the legends below it.
+    """
     map_axes, *side_axes = figure.axes
     old_width, old_height = figure.get_size_inches().tolist()
     map_box = map_axes.get_position()
@@ -685,13 +695,13 @@ def _narrow_map(figure: Figure) -> Figure:
 
 
 def _left_title(axes: Axes) -> list[Text]:
-    """Return a list with the left title of a panel; empty without a title."""
+    """Return the text objects of a panel's left title: one, or none if the title is empty."""
     title = axes.get_title("left")
     return [child for child in axes.get_children() if isinstance(child, Text) and title and child.get_text() == title]
 
 
 def _wrap_text(text: Text, width: float) -> float:
-    """Break a text into lines of at most `width` inches, and return the total height of the lines, inches."""
+    """Break a text object into lines of at most `width` inches; return the height of all lines, inches."""
     size = float(text.get_fontsize()) / 72.0
     lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))

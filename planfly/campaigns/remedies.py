@@ -24,7 +24,9 @@ _HEIGHT_RULES = ("clearance", "approach", "climbout")
 
 
 def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
-    """Return changes that would raise the probability, for the most failed rules; () if no flight failed.
+    """Return texts on changes that would raise the probability, those for the most failed rule first.
+
+    () if no flight failed a rule.
 
     scenario: scenario of the mission.
     """
@@ -37,6 +39,8 @@ def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
 
 def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) -> list[str]:
     """Return texts on the changes that would help against the failures of a rule; [] if none is known.
+
+    For a rule whose margin is a length, the text states by how much to change it, if the margin is known.
 
     low_margin: margin that 5 % of the flights fall below, m; None if it is unknown.
     """

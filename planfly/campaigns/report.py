@@ -128,9 +128,9 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the flown heights along the path and the positions at waypoints; return figures and titles.
+    """Draw the fan of clearances along the path and the crossings of waypoints; return each figure and its title.
 
-    Return [] if no flight has a track.  There is no clearance fan without terrain.
+    Return [] if no flight has path data.  There is no fan without terrain.
     """
     setup = make_setup(base.scenario, base.uav, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.positions
@@ -190,7 +190,7 @@ class OutputDirectory:
 
     table: name of the file with the table of flights.
     resume: True resumes the campaign in the folder.
-    overwrite: True replaces the campaign.
+    overwrite: True permits to replace the contents of the folder.
     """
 
     folder: Path
@@ -199,7 +199,10 @@ class OutputDirectory:
     overwrite: bool
 
     def check_contents(self) -> None:
-        """Raise PlanflyError if the folder is a file, or has contents that may not be resumed or replaced."""
+        """Raise PlanflyError if the folder cannot be resumed or must not be replaced.
+
+        A campaign to resume needs its table; a new campaign needs an empty or missing folder, or `overwrite`.
+        """
         folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
@@ -223,8 +226,8 @@ class OutputDirectory:
 
         The plan of a scenario is stored in the folder, so that the campaign can be resumed later.
 
-        open_base: opens the base, with the plan file of a resumed campaign, or with None.
-        Raises PlanflyError before the folder is changed.
+        open_base: function that opens the base from the plan file of a resumed campaign, or from None.
+        Raises PlanflyError, before the folder is changed, as `check_contents` or `open_base`.
         """
         self.check_contents()
         plan_file = self.folder / "plan.json"
@@ -238,11 +241,12 @@ class OutputDirectory:
 
 @contextmanager
 def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
-    """Yield the folder of a campaign.
+    """Yield the output directory of a campaign.
 
     out: path of the folder, or None for a temporary folder, which is removed at the end.
+    table, resume, overwrite: as for `OutputDirectory`.
 
-    Raises ArgumentError for a campaign to be resumed without a folder.
+    Raises ArgumentError if a campaign is to be resumed, but `out` is None.
     """
     if out is not None:
         yield OutputDirectory(Path(out), table, resume, overwrite)
@@ -306,9 +310,9 @@ _MAX_NAMED_COLUMNS = 5
 
 
 def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
-    """Repeat a flight of the table, and record it in a log.
+    """Repeat a flight of the table, record it in a log, and return the new row.
 
-    Raises PlanflyError if the result differs from the table, because another machine computed it differently.
+    Raises PlanflyError if the rows differ, because another machine or other code computed the stored row.
     """
     new_row = fly_one(base, row.draw.index, log=log)
     if columns := differing_columns(row, new_row):
@@ -344,7 +348,7 @@ _BOUNDARY_EXPLANATION = (
 
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
-    """Return the boundary, its interval and the flights of each wind direction, for the go/no-go chart."""
+    """Return the directions of the go/no-go chart, each with its boundary and its flights."""
     directions, reasons = [], winds.reasons
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
@@ -367,7 +371,10 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
 
 
 def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: str) -> None:
-    """Write the files of a search for winds: ``winds.json``, ``winds.png`` and ``winds.html``."""
+    """Write the files of a search for winds: ``winds.json``, ``winds.png`` and ``winds.html``.
+
+    command: the command line that repeats the search, for the page.
+    """
     goal, directions, reasons = winds.goal, chart_directions(winds), winds.reasons
     wind = base.scenario.wind
     scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
@@ -400,7 +407,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
         "seed": base.seed,
         "target": goal.target,
         "answer": winds.answer,
-        "reason": next(iter(_unsettled_lines(winds)), ""),
+        "reason": next(iter(_unjudged_lines(winds)), ""),
         "confidence": goal.confidence,
         "most": goal.most,
         "flights": len(winds.flights),
@@ -445,12 +452,15 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
 
 
 def _speed_text(speed: float, max_speed: float) -> str:
-    """Return a boundary as text; a boundary at the maximum wind of the search is "over" that wind."""
+    """Return a boundary as text, such as "9.5 m/s", or "over 20 m/s" at the maximum wind of the search.
+
+    speed, max_speed: boundary and maximum wind, m/s.
+    """
     return f"over {max_speed:g} m/s" if speed >= max_speed - 1e-9 else f"{speed:.1f} m/s"
 
 
 def _interval_text(lower: float, upper: float, max_speed: float) -> str:
-    """Return an interval of the boundary as text; bounds beyond the maximum wind are "over" that wind.
+    """Return an interval of the boundary as text, such as "9.1 to 9.9", or "9.1 to over 20" at the maximum wind.
 
     lower, upper, max_speed: m/s.
     """
@@ -459,8 +469,8 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
-def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return lines that say which directions of a search are not judged, and why; [] if all are judged."""
+def _unjudged_lines(winds: WindsResult) -> list[str]:
+    """Return lines on the directions of a search that are not judged, and on the reasons; [] if all are judged."""
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
@@ -492,7 +502,7 @@ def _deciding_rules(winds: WindsResult) -> list[str]:
 
 
 def _flown_bound_lines(winds: WindsResult) -> list[str]:
-    """Return lines on the flown winds of the directions whose boundary is not stated.
+    """Return lines on the directions without a stated boundary: strongest wind without and weakest wind with a failure.
 
     Neighbouring directions with the same text share a line.  Returns [] if all boundaries are stated, or if only calm
     air was flown.
@@ -527,7 +537,7 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
 
 
 def _boundary_lines(winds: WindsResult) -> list[str]:
-    """Return one line with the lowest and the highest boundary of a search for winds; [] if none is stated."""
+    """Return a list with one line on the lowest and the highest boundary of a search; [] if no boundary is stated."""
     directions = [
         direction
         for direction, is_estimated in zip(chart_directions(winds), winds.estimated, strict=True)
@@ -561,7 +571,7 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
 def wind_lines(winds: WindsResult) -> list[str]:
     """Return the result of a search for winds as a few lines of text."""
     percent = f"{100 * winds.goal.confidence:g} %"
-    answer_lines = [*_unsettled_lines(winds), *_boundary_lines(winds)]
+    answer_lines = [*_unjudged_lines(winds), *_boundary_lines(winds)]
     if winds.answer == "not flyable":
         # Failures in calm air answer the question, whatever the directions show.
         answer_lines.reverse()

@@ -94,7 +94,7 @@ class ContingencyFormula:
     """Contingency volume of a fixed-wing aircraft by formula (Annex A, LBA, FOCA), m.
 
     speed: highest speed, m/s.
-    flight_height: height of the flight geography above ground.
+    flight_height: height of the flight geography above ground, m.
     """
 
     speed: float
@@ -163,7 +163,7 @@ def one_to_one_buffer(height: float, dimension: float) -> float:
 
 
 def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
-    """Return the width of the ground risk buffer by a fall without drag, S_GRB = v sqrt(2 H_CV / g) + CD / 2, m.
+    """Return the width of the ground risk buffer for a fall without drag, S_GRB = v sqrt(2 H_CV / g) + CD / 2, m.
 
     Annex A, LBA and FOCA use this formula for rotorcraft only.
     height, dimension: H_CV and CD as for `one_to_one_buffer`, m.
@@ -176,7 +176,7 @@ def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
 
 
 def glide_buffer(height: float, glide_ratio: float) -> float:
-    """Return the width of the ground risk buffer by a glide without power, S_GRB = E H_CV, m (Annex A, LBA).
+    """Return the width of the ground risk buffer for an unpowered glide, S_GRB = E H_CV, m (Annex A, LBA).
 
     height: height of the operational volume above ground, H_CV, m.
     glide_ratio: best glide ratio of the aircraft, E.

@@ -31,7 +31,7 @@ from planfly.campaigns.statistics.decision import (
     Estimator,
     Goal,
     Tally,
-    chance_probability,
+    dependence_p_value,
     first_order_index,
     rank_slope,
 )
@@ -59,7 +59,7 @@ class Sensitivity:
 
     index: first-order index: fraction of the margin's variance that the quantity explains, 0 to 1.
     slope: rank correlation, negative if an increase of the quantity reduces the margin.
-    p_value: probability of such a dependence by chance, see `chance_probability`.
+    p_value: probability of a dependence at least as strong by chance, see `dependence_p_value`.
     """
 
     quantity: str
@@ -82,7 +82,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class RankedRule:
-    """Rule in the ranking of a campaign by how close its flights came to failing it.
+    """Rule in a campaign's ranking of rules by how close the flights came to failing them.
 
     failed: number of flights that failed the rule.
     lowest: smallest margin of all flights, in `unit`; None if no flight has a margin, or if a flight failed by an
@@ -98,14 +98,14 @@ class RankedRule:
 
     @property
     def is_narrow_pass(self) -> bool:
-        """True if every flight passed the rule, but one of them by less than the rule's scale."""
+        """True if no flight failed the rule, but at least one passed it by less than the rule's scale."""
         scale = MARGIN_SCALES[self.rule]
         return not self.failed and self.lowest is not None and scale is not None and self.lowest < scale
 
 
 @dataclass(frozen=True)
 class DecidingRule:
-    """Rule that decides a campaign, and what its margin depends on.
+    """Rule that decides a campaign, and the quantities on which its margin depends.
 
     low_margin: 5 % quantile of its margin, in `unit`; None if it is unknown, for example because 5 % of the flights
         failed by an unknown margin.
@@ -135,10 +135,9 @@ class DecidingRule:
 class CampaignSummary:
     """Contents of the summary and the report.
 
-    deciding: rules that the most flights failed (ties included), the most urgent first.  If no flight failed a rule,
-        the
-    rule with the smallest reliability index: the mean of its margins divided by their standard deviation (Cornell, "A
-    probability-based structural code", ACI Journal 66, 1969).  () if no margin is known.
+    deciding: rules that the most flights failed (ties included), the most urgent first.  If no flight failed a rule, it
+        is the rule with the smallest reliability index: the mean of its margins divided by their standard deviation
+        (Cornell, "A probability-based structural code", ACI Journal 66, 1969).  () if no margin is known.
     conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
     deciding_flights: number of flights that would decide the target with the same fraction of flyable flights; None if
     the target is decided, or for more than `MAX_DECIDING_FLIGHTS`.
@@ -252,7 +251,7 @@ def _margin_quantile(margins: Floats) -> float | None:
 def _rank_rules(
     store: Store, margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]
 ) -> tuple[RankedRule, ...]:
-    """Return the rules in the order of how close the flights came to failing them.
+    """Return the rules in their ranking: the rule that the flights came closest to failing is first.
 
     Rules that flights failed come first, the most flights first; they are included even without a margin.
 
@@ -276,7 +275,7 @@ def _rank_rules(
 
 
 def _margin_unit(store: Store, rule: str) -> str:
-    """Return the unit of a rule's margins: that of the first flight with one, or else the usual unit."""
+    """Return the unit of a rule's margins, from the first flight that has a margin, or else the rule's usual unit."""
     words = RULE_WORDS[rule]
     place_json = store.first_text(words.place_column)
     if place_json is not None:
@@ -307,7 +306,7 @@ def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tu
     for name, all_values in drawn_values.items():
         values = all_values[is_judged]
         index = first_order_index(values, margin)
-        p_value = chance_probability(values, margin)
+        p_value = dependence_p_value(values, margin)
         sensitivities.append(Sensitivity(name, index, rank_slope(values, margin), p_value))
     return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
 
@@ -386,7 +385,7 @@ def summary_json(summary: CampaignSummary) -> str:
 
 
 def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
-    """Return a flight as data for a JSON document.
+    """Return the row of a flight as data for ``summary.json``.
 
     log: path of the flight's log, or "" for a flight without a log.
     """
@@ -423,9 +422,9 @@ def closest_text(row: FlightRow) -> str:
 
 
 def worst_flight_logs(worst: Sequence[FlightRow]) -> list[str]:
-    """Return the path of each flight's log, relative to the campaign's folder.
+    """Return the path of each worst flight's log, relative to the campaign's folder.
 
-    The path is "" for a flight without a log.
+    Only the first `LOGGED_FLIGHT_COUNT` flights that flew at all have a log; the path is "" for the others.
     """
     logged_indices = [row.draw.index for row in worst if row.duration > 0.0][:LOGGED_FLIGHT_COUNT]
     return [f"worst/flight-{row.draw.index:06d}.mcap" if row.draw.index in logged_indices else "" for row in worst]
@@ -493,7 +492,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 
 def undecided_lines(summary: CampaignSummary) -> list[str]:
-    """Return a line on the flights that are not judged in full, with the first reason; [] if there are none."""
+    """Return a line with the number of undecided flights and the first reason; [] without undecided flights."""
     tally = summary.estimate.tally
     if not tally.undecided:
         return []
@@ -502,7 +501,7 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
-    """Return a line on the margin of each deciding rule and on what it depends on; [] if no margin is known."""
+    """Return a line on each deciding rule: its margin and the quantities that explain it; [] without deciding rules."""
     choice_text = (
         "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter. "
     )

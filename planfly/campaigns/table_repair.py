@@ -43,8 +43,9 @@ def checksum(values: Iterable[Any]) -> str:
 
 
 class Examination(NamedTuple):
-    """Numbers of undamaged and damaged flights, both in ascending order.
+    """Result of an examination of a table.
 
+    undamaged, damaged: numbers of the flights with an undamaged and with a damaged row, ascending.
     is_sound: True if SQLite finds no error in the file, even if some rows are damaged.
     last_known: number of the last known flight of a broken file, if flights after it may have been lost; -1 if no
         flight is known; None if no later flight can be missing.
@@ -88,7 +89,7 @@ def examine_table(
 
     columns: columns of the checksum, in order, with the flight's number first.
     requested_count: number of requested flights.
-    max_number: number of flights to try one by one in a broken file.
+    max_number: in a broken file, the flights with the numbers 0 to ``max_number - 1`` are read one by one.
     Raises sqlite3.Error for a file that another process has locked.
     """
     # Invalid UTF-8 must not stop the reading, because it changes the checksum anyway.
@@ -132,9 +133,9 @@ def examine_table(
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
-    """Separate undamaged from damaged flights by the checksum at the end of each row.
+    """Return the numbers of the flights whose row agrees with its checksum, and of the other flights.
 
-    rows: each begins with the number of its flight.
+    rows: values of each row; the first is the number of the flight, the last is the checksum.
     """
     examination = Examination([], [])
     for *values, stored_checksum in rows:

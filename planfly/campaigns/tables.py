@@ -67,7 +67,7 @@ ROW_COLUMNS = _row_columns()
 
 
 def row_values(row: FlightRow) -> dict[str, Any]:
-    """Return the value of a flight for each column of `ROW_COLUMNS`, keyed by column name."""
+    """Return the stored value of each column of `ROW_COLUMNS` for a flight, keyed by column name."""
     values: dict[str, Any] = dict.fromkeys(ROW_COLUMNS)
     values |= {"seed": row.draw.seed, **row.draw.values}
     values |= {name: column.write(getattr(row, name)) for name, column in COLUMN_FIELDS.items()}
@@ -80,9 +80,9 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
-    """Rebuild a flight's record from the stored values of its row; the inverse of `row_values`.
+    """Make the row of a flight from its stored values; the inverse of `row_values`.
 
-    index: number of the flight's draw.
+    index: index of the flight's draw.
     values: stored value of each column, keyed by the column's name.
     """
     margins = []
@@ -98,12 +98,12 @@ def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
 
 
 def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
-    """Return True if two rows describe the same flight; columns that depend on the machine are ignored."""
+    """Return True if two rows have the same draw and agree in all columns of `differing_columns`."""
     return first.draw.index == second.draw.index and not differing_columns(first, second)
 
 
 def differing_columns(first: FlightRow, second: FlightRow) -> list[str]:
-    """Return the names of the columns in which two rows differ, except columns that depend on the machine."""
+    """Return the names of the columns in which two rows differ; `RUN_DEPENDENT_COLUMNS` are not compared."""
     first_values, second_values = (row_values(replace(row, made_of="")) for row in (first, second))
     return [
         name for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS and first_values[name] != second_values[name]
@@ -161,7 +161,9 @@ class LockedTable:
     def __init__(self, path: Path, kind: TableKind, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
         """Create the table, or open it to resume.
 
+        kind: columns and fixed settings of the table.
         settings: settings of the request, which are stored in the file.
+        resume: True to open an existing table, which must be there.
         Raises StoreError for a file of another kind or campaign, and for a file that another process has locked.
         Raises OSError for a full disk.
         """
@@ -275,10 +277,7 @@ class LockedTable:
         report_line(f"{self.path}: {examination.describe()}")
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table contains more flights than requested.
-
-        The base class accepts any number.
-        """
+        """Raise StoreError if the table contains more flights than the settings request; here, accept any number."""
 
     def __enter__(self) -> Self:
         """Return the locked table."""
@@ -291,7 +290,9 @@ class LockedTable:
         self._connection.close()
 
     def insert(self, values: Mapping[str, Any]) -> None:
-        """Write a flight durably, one value per column.
+        """Write the row of a flight durably.
+
+        values: value of each column, keyed by the column's name.
 
         Raises OSError for a full disk or a removed table; earlier flights stay in the file. Raises StoreError for a
         number that the table already has.
@@ -427,12 +428,13 @@ class Store(LockedTable):
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
         """Create the table, or open it to resume.
 
-        Raises StoreError if the table contains more flights than requested.
+        made_of, settings, resume: as for `LockedTable`.
+        Raises as `LockedTable`, and StoreError if the table contains more flights than requested.
         """
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table contains more flights than requested."""
+        """Raise StoreError if the table contains more flights than the settings request."""
         if (flight_count := self.tally().flown) > settings.get("flights", math.inf):
             reason = f"flights {settings['flights']}: the table already contains {count_text(flight_count, 'flight')}"
             raise StoreError(f"{self.path}: {reason}", file=self.path)
@@ -446,43 +448,46 @@ class Store(LockedTable):
         return dict(self._connection.execute("SELECT flight, outcome FROM flights ORDER BY flight"))
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """Return a column of numbers in the order of flights, (n,); a missing value is NaN."""
+        """Return a column of numbers by its name, in the order of flights, (n,); a missing value is NaN."""
         rows = self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")
         return np.fromiter((math.nan if value is None else value for (value,) in rows), dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
-        """Return a column of texts, in the order of flights."""
+        """Return a column of texts by its name, in the order of flights."""
         return [
             str(value)
             for (value,) in self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")
         ]
 
     def failures(self) -> list[tuple[tuple[str, Place], ...]]:
-        """Return rule and place of each flight's failed findings, in order; () for an undecided flight."""
+        """Return, for each flight in order, rule and place of its failed findings; () for an undecided flight."""
         return [
             () if outcome == "undecided" else parse_failed_findings(text)
             for outcome, text in zip(self.texts("outcome"), self.texts("failed"), strict=True)
         ]
 
     def first_text(self, name: str) -> str | None:
-        """Return the first text in a column that is not empty, in the order of flights; None without one."""
+        """Return the text of the first flight that has one in a column; None if no flight has one."""
         query = f"SELECT {_check_column(name)} FROM flights WHERE {name} IS NOT NULL ORDER BY flight LIMIT 1"
         row = self._connection.execute(query).fetchone()
         return None if row is None else str(row[0])
 
     def blobs(self, name: str, max_count: int) -> list[bytes]:
-        """Return a column of arrays as bytes, for at most `max_count` flights that have an array, in order."""
+        """Return the bytes of a column of arrays for the first `max_count` flights that have an array, in order."""
         query = f"SELECT {_check_column(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
         return [value for (value,) in self._connection.execute(query, (max_count,))]
 
     def has_track(self) -> list[bool]:
-        """Return True for each flight whose path data are stored, False for the others, in order."""
+        """Return a list with an entry for each flight, in order: True if its path data are stored."""
         return [
             bool(size) for (size,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")
         ]
 
     def worst_flights(self, max_count: int) -> list[FlightRow]:
-        """Return the worst flights: lost, then failed, then undecided flights, then those with small margins."""
+        """Return at most `max_count` flights, the worst first: lost, failed, undecided, then flyable flights.
+
+        Within each outcome, the flights with the smallest scaled margin come first.
+        """
         ranks = "WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 WHEN 'undecided' THEN 2 ELSE 3"
         order = f"CASE outcome {ranks} END, closeness IS NULL, closeness"
         rows = self._connection.execute(f"{_SELECT_ROWS} ORDER BY {order}, flight LIMIT ?", (max_count,))
@@ -500,7 +505,7 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
-    """Return the name of a column unchanged; raise KeyError for any other text, because it enters a query."""
+    """Return the name of a column unchanged; raise KeyError for any other text, which must not get into a query."""
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
@@ -552,8 +557,10 @@ class RequestedFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownFlight:
-    """Outcome of a flight, the rule and place of each failed finding, and the marginal passes.
+    """Result of a flight of a search, as far as the search uses it.
 
+    failed: rule and place of each failed finding.
+    marginal_passes: rules that the flight nearly failed.
     undecided: rules that leave the flight undecided, with their reasons; "" for other flights.
     """
 
@@ -648,9 +655,10 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def with_place_numbers(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Replace each column of places in JSON by three columns: kind, index and item of the place.
+    """Return the columns with each column of places (JSON texts) replaced by kind, index and item of the place.
 
-    The item of a leg is the item to which it leads.  Missing numbers are NaN.
+    The new names end in _kind, _index and _item.  The item of a leg is the item to which it leads.  Missing numbers are
+    NaN, and missing kinds are None.
     """
     names = {rule.place_column for rule in RULE_WORDS.values()}
     places = {text: json.loads(text) for name in names & columns.keys() for text in set(columns[name]) - {None}}

@@ -11,9 +11,9 @@ TIME_FORMAT = "%Y-%m-%d %H:%M"
 
 
 def answer_line(result: WindowResult) -> str:
-    """Return the answer in one line, for the requested departure if there is one, and for all windows.
+    """Return the answer in one line: go, no go or not judged for a requested departure, and all windows.
 
-    The text for a requested departure is go, no go, or not judged. It is given with the number of flyable flights.
+    The number of flyable flights is stated for a departure that was flown.
     """
     goal, departure = result.goal, result.asked
     window_texts = []
@@ -48,7 +48,7 @@ def _best_text(result: WindowResult) -> str:
 
 
 def unjudged_lines(result: WindowResult) -> list[str]:
-    """Return a line with the rules that are not judged in some flights, each with its first reason; [] if none is."""
+    """Return one line on the rules that are not judged in some flights, each with its first reason; [] without any."""
     texts: dict[str, str] = {}
     for departure in result.departures:
         for row in departure.rows:

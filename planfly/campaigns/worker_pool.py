@@ -47,6 +47,7 @@ class WorkerPool(Protocol):
 def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[WorkerPool]:
     """Yield the pool of workers that fly a campaign.
 
+    base: inputs that all flights of the campaign share.
     fly: function that flies one flight of the campaign.
 
     On exit, local processes are ended, or the campaign is removed from a cluster's workers.  Raises SchedulerError for
@@ -101,7 +102,7 @@ def check_scheduler_address(address: str) -> str:
 
 
 class FlightRate:
-    """Rate of the flights since this object was created.
+    """Clock of a campaign: rate of the flights since this object was created, and time of the next report.
 
     stored_count: number of flights in the table at the start.
     """
@@ -111,7 +112,7 @@ class FlightRate:
         self._start_time = self._last_report = time.monotonic()
 
     def is_due(self) -> bool:
-        """Return True if the next report is due, and start timing the following report."""
+        """Return True if `REPORT_INTERVAL_S` has passed since the last report; the interval then starts again."""
         now = time.monotonic()
         if now - self._last_report < REPORT_INTERVAL_S:
             return False

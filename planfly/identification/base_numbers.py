@@ -1,4 +1,4 @@
-"""Extract the numbers of a base aircraft from its JSBSim model in level flight at cruise."""
+"""Measure mass, inertia, coefficients and motor of a base aircraft on its JSBSim model in level flight at cruise."""
 
 import math
 from collections.abc import Callable
@@ -67,9 +67,7 @@ def base_model(aircraft: Aircraft) -> BaseModel:
 
 
 def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
-    """Return the values of `base_model` for an aircraft with varied properties.
-
-    The motor of the result is always tabulated.
+    """Return the `base_model` of an aircraft with varied properties, always with a tabulated motor.
 
     Raises FlightError for an aircraft without steady flight at cruise.
     """
@@ -81,7 +79,10 @@ class _Probe:
     """JSBSim model of an aircraft, evaluated at chosen flow angles, angular rates and surface deflections."""
 
     def __init__(self, aircraft: Aircraft, variation: Variation | None = None) -> None:
-        """Trim an aircraft for level flight at cruise.  Raises FlightError if there is no such trim."""
+        """Load the model of an aircraft, and trim it for level flight at cruise.
+
+        Raises FlightError if there is no such trim.
+        """
         self._aircraft = aircraft
         self._fdm = fdm = Fdm(aircraft, variation=variation)
         read = fdm.properties.getter
@@ -103,8 +104,9 @@ class _Probe:
         self._pressure_force = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def base_model(self, motor: Motor, *, has_torque_reaction: bool) -> BaseModel:
-        """Measure the numbers of the JSBSim model, and return them with `motor`.
+        """Return mass, sizes, inertia and coefficients of the JSBSim model, with a motor.
 
+        motor: motor of the result.
         has_torque_reaction: True if the propeller's torque rolls the aircraft.
         """
         return BaseModel(
@@ -196,20 +198,27 @@ class _Probe:
         )
 
     def _vary_axis(self, quantity: Literal["surfaces", "rates"], axis: int, value: float) -> Floats:
-        """Return the coefficients (6,) at zero angle of attack with one deflection (rad) or rate (rad/s)."""
+        """Return the coefficients of `_evaluate_coefficients`, (6,), with one deflection or rate that is not 0.
+
+        axis: index of the surface (elevator, aileron, rudder) or rate (p, q, r).
+        value: deflection, rad, or rate, rad/s.
+        """
         vector = value * np.eye(3)[axis]
         if quantity == "surfaces":
             return self._evaluate_coefficients(0.0, surfaces=vector)
         return self._evaluate_coefficients(0.0, rates=vector)
 
     def _differentiate(self, function: Callable[[float], Floats], step: float) -> Floats:
-        """Return the derivative (6,) of a function of one number at 0, by a central difference."""
+        """Return the derivative at 0 of a function from a number to coefficients, (6,), by a central difference.
+
+        step: distance from 0 to either side.
+        """
         return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
     def _evaluate_coefficients(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Evaluate drag, lift, side force, roll, pitch and yaw moment, as coefficients (6,), without throttle.
+        """Return the coefficients of drag, lift, side force, roll, pitch and yaw moment with closed throttle, (6,).
 
         alpha, beta: angles of attack and sideslip, rad.
         rates: angular rates p, q, r, rad/s, zero by default.
@@ -321,7 +330,7 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
 
 
 def scale_base_model(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
-    """Scale a model to another mass (kg), span (m) and wing area (m^2).
+    """Return a model scaled to another mass (kg), span (m) and wing area (m^2).
 
     Inertia scales with mass and span squared.  The chord keeps its ratio to area / span.  Induced drag is CL^2 divided
     by pi, span efficiency and aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2); the efficiency, all

@@ -51,10 +51,7 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
 
 
 def check_commands(records: Sequence[FlightRecord]) -> None:
-    """Raise LogError for a log whose throttle never moves, or whose surfaces hardly move in turns.
-
-    The surfaces are elevator and aileron.
-    """
+    """Raise LogError for a log whose throttle never moves, or whose elevator or aileron hardly moves in turns."""
     for source in dict.fromkeys(record.source for record in records):
         parts = [record for record in records if record.source == source]
         controls = np.concatenate([part.controls for part in parts])
@@ -73,9 +70,9 @@ def check_commands(records: Sequence[FlightRecord]) -> None:
 
 
 def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
-    """Raise LogError if the logged battery power differs too much from the identified aircraft's power.
+    """Raise LogError if the mean logged battery power of a log differs too much from the identified aircraft's power.
 
-    Both are means over a log.  Without a logged current nothing is checked.
+    Without a logged current nothing is checked.
     """
     if not estimate.with_current:
         return
@@ -100,7 +97,7 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
     """Raise LogError for an estimate with an implausible value.
 
-    A reversed control, a lift slope or a parameter outside its limits, and a mass that changes are implausible.
+    Implausible are a reversed control, a lift slope or a parameter outside its limits, and a changing mass.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
@@ -139,7 +136,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
 
 
 def estimate_mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
-    """Estimate the change of mass within the logs, as a fraction, and its standard deviation.
+    """Return the estimated change of mass within the logs, as a fraction, and its standard deviation.
 
     An aircraft that burns fuel or drops a load needs less and less angle of attack than its assumed mass requires.  The
     change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above zero

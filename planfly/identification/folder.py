@@ -74,8 +74,8 @@ class Identified:
     base: the aircraft from which the identification started.
     numbers: model values of the base, scaled to the aircraft.
     draws: parameter values of 512 aircraft drawn from the estimate, (512, n).
-    logs: the logs used.
-    outputs: the servo outputs.
+    logs: the logs from which the aircraft was identified.
+    outputs: servo output of each control.
     cruise: cruise airspeed, m/s, true.
     until: time in each log from which rows were not used, s; None if all rows were used.
     """
@@ -90,7 +90,7 @@ class Identified:
     until: float | None = None
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return the performance of the estimate, in arrays (1,), and that of the draws, in arrays (512,)."""
+        """Return the performance of the estimate, in arrays (1,), and of the draws, in arrays (512,)."""
         best, samples = (
             performance(self.numbers, values, self.cruise, DENSITY) for values in (self.estimate.values, self.draws)
         )
@@ -112,10 +112,7 @@ class Identified:
         return Draws((*properties, DRIVE_POWER), np.column_stack([self.draws, self.drive_power]))
 
     def power_conflict(self) -> PowerConflict | None:
-        """Return the conflict between the estimated drag and power in level flight.
-
-        Returns None without a conflict.
-        """
+        """Return the conflict between estimated drag and estimated power in level flight; None without a conflict."""
         best, _ = self.performance()
         return power_conflict(float(best.drag[0]) * self.cruise, float(best.power[0]), self.numbers.mass)
 
@@ -128,9 +125,7 @@ def make_identification(
     outputs: Mapping[str, ServoOutput],
     until: float | None = None,
 ) -> Identified:
-    """Return an identification with 512 draws from its estimate.
-
-    The cruise speed is that of the last log.
+    """Return the results of an identification, with 512 draws from its estimate, and the cruise speed of the last log.
 
     numbers: model values of the base, scaled to the aircraft.
     outputs: servo output of each control.
@@ -141,7 +136,7 @@ def make_identification(
 
 
 def make_folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
-    """Return the files of an identified aircraft's folder, except the HTML page: text by file name.
+    """Return the text of each file of an identified aircraft's folder, except the HTML page, by file name.
 
     The mission of manoeuvres starts at the home position of the last log that has one; without a home position it is
     left out.
@@ -240,7 +235,7 @@ def _find_airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float
 def _format_metadata(
     identified: Identified, battery: tuple[float, float], min_level_speed: float, max_level_speed: float = math.inf
 ) -> str:
-    """Return the text of ``name.toml``, the metadata of the aircraft.
+    """Return the text of the aircraft's TOML file with its metadata, which is named after the aircraft.
 
     battery: voltage, V, and energy, J.
     min_level_speed, max_level_speed: minimum and maximum airspeed of level flight, m/s.
@@ -280,9 +275,9 @@ def _format_metadata(
 
 
 def select_flown_parameters(log: MotionLog) -> dict[str, float]:
-    """Return the parameters of a log that determine flight behaviour, by their current names and units.
+    """Return the parameters of a log that determine flight behaviour, by ArduPlane's current names and in its units.
 
-    The log may use the parameter names of ArduPlane 4.4 and earlier; values out of range are left out.
+    The log may use the names of ArduPlane 4.4 and earlier.  Values out of range are left out.
     """
     old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     current_names = {definition.name for definition in DEFINITIONS.values()}
@@ -354,6 +349,8 @@ def format_posterior(identified: Identified) -> str:
 def _format_quantity(name: str, unit: str, numbers: tuple[float, float, float, float, float], reason: str) -> list[str]:
     """Return the lines of a ``[[quantity]]`` table.
 
+    name: name of the quantity's property in the model.
+    unit: unit of the numbers.
     numbers: prior, standard deviation of the prior, estimate, standard deviation of the estimate, and the fraction of
         the prior variance that the logs removed.
     reason: sentence that says what the quantity is.

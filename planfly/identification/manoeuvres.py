@@ -52,7 +52,11 @@ def make_identification_mission(
     def add_item(
         command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, altitude: float
     ) -> None:
-        """Append a mission item with the next number, its position rounded as in a mission file (deg, m)."""
+        """Append a mission item with the next number; position and altitude are rounded as in a mission file.
+
+        lat, lon: degrees.
+        altitude: m, in the altitude frame of the item.
+        """
         number = len(items) + 1
         items.append(
             MissionItem(number, command, frame, params, round_to_grid(lat), round_to_grid(lon), round(altitude, 2))
@@ -74,7 +78,7 @@ def make_identification_mission(
 def _lay_out_waypoints(
     aircraft: Aircraft, envelope: Envelope, start_altitude: float, repeats: int, max_rates: tuple[float, float]
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield east, north and altitude (m) of each waypoint, and the airspeed on the leg to it (m/s).
+    """Yield for each waypoint east, north and altitude, m, and the airspeed on the leg to it, m/s.
 
     start_altitude: altitude of the first waypoint, m AMSL.
     repeats, max_rates: see `make_identification_mission`.

@@ -27,9 +27,10 @@ _MAX_ALPHA_RAD = 0.25
 
 
 def format_identified_model(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
-    """Return the text of ``name.xml``, the base's JSBSim model with the identified changes.
+    """Return the JSBSim model of an identified aircraft, as the text of its XML file.
 
     base: the aircraft whose model is extended.
+    name: name of the identified aircraft.
     numbers: model values of the base, scaled to the aircraft.
     values: values of `aircraft.identification.parameters.PARAMETERS`, (n,).
     """
@@ -70,10 +71,10 @@ def format_identified_model(base: Aircraft, name: str, numbers: BaseModel, value
     <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
       <max> <v> {-_MAX_ALPHA_RAD} </v> <p> aero/alpha-rad </p> </max> </min> </function>
     <function name="ident/lift-before">
-      <sum> <v> {number(lift_zero)} </v> {_write_product(lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
+      <sum> <v> {number(lift_zero)} </v> {_format_product(lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
     <function name="ident/lift-after">
       <sum> <v> {number(lift_zero)} </v> <p> ident/lift-offset </p>
-        {_write_product(lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function></a>"""
+        {_format_product(lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function></a>"""
     first_axis = list(aerodynamics).index(_find_part(root, "aerodynamics/axis", base))
     for k, function in enumerate(ElementTree.fromstring(lift_functions)):
         aerodynamics.insert(first_axis + k, function)
@@ -110,7 +111,11 @@ def check_base(base: Aircraft) -> None:
 
 
 def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.Element:
-    """Return the element at a path of the base's model.  Raises FlightError if the model lacks it."""
+    """Return the element at a path of the base's model.
+
+    path: path below the root, such as "metrics/chord".
+    Raises FlightError if the model lacks the element.
+    """
     element = root.find(path)
     if element is None:
         allowed = "the model of a base aircraft needs this element; for an example see aircraft/aerosonde/aerosonde.xml"
@@ -132,16 +137,17 @@ def _format_factor_minus_one(name: str) -> str:
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
-def _write_product(coefficient: float, *factors: str) -> str:
+def _format_product(coefficient: float, *factors: str) -> str:
     """Return the XML product of a coefficient and of factors given as XML."""
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
 
 
 def _format_added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the JSBSim function that adds the estimated terms to an axis.
+    """Return the XML of the JSBSim function that adds the estimated terms to an axis.
 
     Returns "" for an axis without estimated terms.
 
+    axis: name of the axis of forces or moments, such as "LIFT".
     drag, control: XML factors that the base applies to drag and to control deflections, or "".
     """
     c = numbers.coefficients
@@ -160,32 +166,32 @@ def _format_added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: 
     terms_by_axis = {
         "X": (
             f"{drag} ",
-            _write_product(c.drag_zero, _format_factor_minus_one("zero-lift-drag")),
-            _write_product(c.drag_induced, "<p> ident/induced-drag </p>", after),
-            _write_product(-c.drag_induced / numbers.induced_factor, before),
+            _format_product(c.drag_zero, _format_factor_minus_one("zero-lift-drag")),
+            _format_product(c.drag_induced, "<p> ident/induced-drag </p>", after),
+            _format_product(-c.drag_induced / numbers.induced_factor, before),
         ),
         "Z": ("", "<difference> <p> ident/lift-after </p> <p> ident/lift-before </p> </difference>"),
         "ROLL": (
             "<p> metrics/bw-ft </p>",
-            _write_product(c.roll_beta, _format_factor_minus_one("dihedral-effect"), beta),
-            _write_product(c.roll_roll, _format_factor_minus_one("roll-damping"), span_factor, roll),
-            _write_product(c.roll_yaw, _format_factor_minus_one("roll-from-yaw"), span_factor, yaw),
-            _write_product(c.roll_aileron, _format_factor_minus_one("aileron-power"), aileron),
+            _format_product(c.roll_beta, _format_factor_minus_one("dihedral-effect"), beta),
+            _format_product(c.roll_roll, _format_factor_minus_one("roll-damping"), span_factor, roll),
+            _format_product(c.roll_yaw, _format_factor_minus_one("roll-from-yaw"), span_factor, yaw),
+            _format_product(c.roll_aileron, _format_factor_minus_one("aileron-power"), aileron),
         ),
         "PITCH": (
             "<p> metrics/cbarw-ft </p>",
             "<p> ident/pitch-offset </p>",
-            _write_product(c.pitch_alpha, _format_factor_minus_one("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
-            _write_product(c.pitch_rate, _format_factor_minus_one("pitch-damping"), chord_factor, pitch),
-            _write_product(c.pitch_elevator, _format_factor_minus_one("elevator-power"), elevator),
+            _format_product(c.pitch_alpha, _format_factor_minus_one("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
+            _format_product(c.pitch_rate, _format_factor_minus_one("pitch-damping"), chord_factor, pitch),
+            _format_product(c.pitch_elevator, _format_factor_minus_one("elevator-power"), elevator),
         ),
         "YAW": (
             "<p> metrics/bw-ft </p>",
-            _write_product(c.yaw_beta, _format_factor_minus_one("weathercock"), beta),
-            _write_product(c.yaw_roll, _format_factor_minus_one("yaw-from-roll"), span_factor, roll),
-            _write_product(c.yaw_yaw, _format_factor_minus_one("yaw-damping"), span_factor, yaw),
-            _write_product(c.yaw_aileron, _format_factor_minus_one("adverse-yaw"), aileron),
-            _write_product(c.yaw_rudder, _format_factor_minus_one("rudder-power"), rudder),
+            _format_product(c.yaw_beta, _format_factor_minus_one("weathercock"), beta),
+            _format_product(c.yaw_roll, _format_factor_minus_one("yaw-from-roll"), span_factor, roll),
+            _format_product(c.yaw_yaw, _format_factor_minus_one("yaw-damping"), span_factor, yaw),
+            _format_product(c.yaw_aileron, _format_factor_minus_one("adverse-yaw"), aileron),
+            _format_product(c.yaw_rudder, _format_factor_minus_one("rudder-power"), rudder),
         ),
     }
     if axis not in terms_by_axis:
@@ -254,7 +260,10 @@ def _format_reactions(numbers: BaseModel, values: Floats, base_properties: list[
 
 
 def _format_disc_functions(disc: PropellerDisc) -> dict[str, str]:
-    """Return JSBSim functions for a propeller disc: exit speed, thrust, torque, battery power and current."""
+    """Return the XML of the JSBSim functions of a propeller disc, by name.
+
+    They are exit speed, thrust, torque, battery power and battery current.
+    """
     exit_property = "<p> motor/exit-mps </p>"
     full_speed = f"<product> <v> {number(disc.exit_speed)} </v> <p> ident/motor-speed </p> </product>"
     exit_speed = f"<product> <p> motor/throttle-norm </p> {full_speed} </product>"
@@ -276,7 +285,7 @@ def _format_disc_functions(disc: PropellerDisc) -> dict[str, str]:
 
 
 def _format_table_functions(motor: MotorTable) -> dict[str, str]:
-    """Return JSBSim functions that look up the tables of a motor.
+    """Return the XML of the JSBSim functions that look up the tables of a motor, by name.
 
     A factor s on motor speed keeps the advance ratio: the tables are read at 1/s of the airspeed, and thrust and torque
     are multiplied by s squared, the power by s cubed.
@@ -296,7 +305,12 @@ def _format_table_functions(motor: MotorTable) -> dict[str, str]:
           <tableData>\n{header}\n{rows}\n</tableData> </table>"""
 
     def format_scaled(values: Floats, factor: str, power: int) -> str:
-        """Return the XML product of a table, a factor, the density ratio and a power of the speed factor."""
+        """Return the XML product of a table, a factor, the density ratio and a power of the speed factor.
+
+        values: values of the table.
+        factor: XML of the factor.
+        power: exponent of the speed factor.
+        """
         return f"<product> {factor} {density_ratio} {power * speed} {format_table(values)} </product>"
 
     load = "<p> ident/propeller-torque </p>"
@@ -310,7 +324,7 @@ def _format_table_functions(motor: MotorTable) -> dict[str, str]:
 
 
 def _format_electric_functions(motor: ElectricMotor) -> dict[str, str]:
-    """Return JSBSim functions for an electric motor with its propeller.
+    """Return the XML of the JSBSim functions of an electric motor with its propeller, by name.
 
     The speed of the propeller is the positive root of the balance of motor and propeller torque.
     """

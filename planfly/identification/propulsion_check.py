@@ -14,7 +14,7 @@ _INTERVAL_SIGMAS = 1.96
 
 @dataclass(frozen=True, slots=True)
 class PowerConflict:
-    """A power in level flight that is too small for the drag.
+    """Conflict of an identified aircraft: its power in level flight is too small for its drag.
 
     drag_power: drag times airspeed in level flight, W.
     power: identified power, W.

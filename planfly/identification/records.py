@@ -88,8 +88,9 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the segments of wing-borne flight without gaps in the data, for an identification.
+    """Return the segments of a log with wing-borne flight and without gaps in the data, for an identification.
 
+    aircraft: base aircraft, whose full deflections are used for the surfaces.
     servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
     min_seconds: minimum total duration of the segments, s.
     until: time in the log from which rows are not used, s.
@@ -270,7 +271,7 @@ def _check_usable(log: MotionLog) -> None:
 
 
 def find_slowest_log_rate(log: MotionLog) -> float:
-    """Return the lower of the log rates of inertial sensors and surface commands, Hz."""
+    """Return the log rate of the inertial sensors or of the surface commands, whichever is lower, Hz."""
     return min(log.inertial.rate, log.surface_commands.rate)
 
 
@@ -305,7 +306,7 @@ def _find_first_output(log: MotionLog, function: int) -> int:
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
-    """Return the servo output of each control, by the log's SERVOn_* parameters.
+    """Return the servo output of each control, according to the log's SERVOn_* parameters, by the control's name.
 
     Full travel is the maximum deflection of the base aircraft.  In ArduPlane a longer pulse means roll to the right,
     nose up and yaw to the right; the model's elevator and rudder have the opposite sign.  Elevons are returned as
@@ -355,9 +356,11 @@ def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _read_pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return the minimum, trim and maximum pulse (us) and the sign of an output.
+    """Return the minimum, trim and maximum pulse, us, and the sign of a servo output, from the log's SERVOn parameters.
 
     The sign is -1 if the output is reversed, otherwise 1.
+
+    number: number of the output, from 1.
     """
     get_parameter = log.parameters.get
     min_pulse = get_parameter(f"SERVO{number}_MIN", 1100.0)
@@ -426,14 +429,15 @@ def _find_settled_flight(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
 
 
 def _cut_blocked_rows(log: MotionLog, usable: Flags, airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
-    """Set the rows of a blocked airspeed sensor to False in a copy of `usable`.
+    """Return a mask (n,): the usable rows except those in which the airspeed sensor is blocked.
 
     In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind along the
     heading varies.  Raises LogError if too many usable rows are blocked.
 
-    airspeed: (n,) m/s.
-    air_velocity: ground velocity minus wind, to north and east, (n, 2) m/s.
-    heading: (n,) rad.
+    usable: True for each usable row, (n,).
+    airspeed: measured airspeed, (n,), m/s.
+    air_velocity: ground velocity minus wind, to north and east, (n, 2), m/s.
+    heading: (n,), rad.
     """
     air_speed_ahead = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
     window_rows = round(_COMPARED_WINDOW_S * GRID_HZ)
@@ -453,9 +457,9 @@ def _cut_blocked_rows(log: MotionLog, usable: Flags, airspeed: Floats, air_veloc
 
 
 def _find_segments(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
-    """Return (first row, end row) of each run of True rows that lasts at least `min_duration`, s.
+    """Return (first row, end row) of each sequence of True rows that lasts at least `min_duration`, s.
 
-    The end row is the first row after the run.
+    The end row is the first row after the sequence.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)

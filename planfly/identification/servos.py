@@ -18,7 +18,7 @@ class ServoOutput:
 
     output: number of the output, from 1.
     pulse: pulse lengths, increasing, us.
-    value: control at each pulse, rad, or fraction of full throttle.
+    value: value of the control at each pulse: deflection, rad, or fraction of full throttle.
     """
 
     output: int
@@ -26,9 +26,9 @@ class ServoOutput:
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """Return the control (n,) at each of the pulses (n,), us.
+        """Return the value of the control for each pulse, (n,), constant beyond the shortest and the longest pulse.
 
-        Beyond the shortest and the longest pulse the control is constant.
+        pulses: pulse lengths, us, (n,).
 
         >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
         array([0.  , 0.25])

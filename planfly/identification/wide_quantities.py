@@ -34,14 +34,15 @@ class WideQuantity:
         return f"{self.title}: known only to ±{100.0 * self.half:.0f} %; to improve this, fly {self.show}"
 
 
+# Lower bound, estimate and upper bound of a quantity.
 Interval = tuple[float, float, float]
 
 
 def wide_quantities(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideQuantity, ...]:
-    """Return sink rate and power in level flight, each only if its 95 % interval is too wide.
+    """Return those of the two quantities, sink rate and power in level flight, whose 95 % interval is too wide.
 
     sink, power: lower bound, estimate and upper bound, in any unit.
-    with_current: True if the battery's current was logged; without it the propeller power is unknown.
+    with_current: True if the battery's current was logged, without which no manoeuvre narrows the power's interval.
 
     >>> [one.title for one in wide_quantities((6.0, 7.0, 8.0), (400.0, 500.0, 590.0), with_current=False)]
     ['sink at idle']

@@ -100,7 +100,10 @@ def _compile_rank_kernels() -> None:
 
 
 def _compile_planner_kernels(part: str) -> None:
-    """Compile the kernels of one part of the planner.  part: a name in `PARTS`, or `FRONT`."""
+    """Compile the kernels of one part of the planner.
+
+    part: a name in `PARTS`, or `FRONT`.
+    """
     scenario, uav = _make_scenario_and_uav()
     call_kernels(part, scenario, uav.limits)
 
@@ -117,7 +120,7 @@ def _compile_flight_kernels() -> None:
 
 
 def _compile_glide_kernels() -> None:
-    """Compile the kernels that judge returns and glides."""
+    """Compile the kernels that judge simulated returns to launch, and glides."""
     scenario, uav = _make_scenario_and_uav()
     setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     return_summary(setup, track=None).data_for_pictures()
@@ -135,10 +138,10 @@ UNITS: dict[str, Callable[[], None]] = {
 
 
 def run_unit(unit: str, report: Callable[[str], None]) -> None:
-    """Run a unit, which compiles its kernels.
+    """Run a unit of work, which compiles its kernels.
 
-    Calls `report` with ``ready KERNEL`` for each kernel that has been compiled.
-
+    unit: name in `UNITS`.
+    report: called with ``ready KERNEL`` for each kernel that has been compiled or loaded.
     Raises KeyError for an unknown unit.
     """
     pending = list(UNIT_KERNELS[unit])

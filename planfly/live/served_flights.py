@@ -1,4 +1,4 @@
-"""Run the flight process of ``planfly serve``, with its scenario, verdicts as status texts, and logs."""
+"""Run the flight process of ``planfly serve``, which judges and flies missions, and logs the flights."""
 
 import contextlib
 import math
@@ -65,7 +65,7 @@ _MAX_TEXTS_PER_VERDICT = 4
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """Options of the command line for serving; both processes read the files named in the options.
+    """Options of ``planfly serve``; the link's process and the flight process both read the files that they name.
 
     mission: path of a mission file, or "".
     speed: multiple of real time.
@@ -84,7 +84,7 @@ class ServedScenario:
     """Scenario in which a vehicle is served.
 
     seed: seed of the turbulence.
-    mission: initial mission, or None to wait for an upload.
+    mission: initial mission; None to wait for an upload.
     fence, rally: items of the named fences and rally points, if there is no initial mission.
     """
 
@@ -120,7 +120,10 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
 def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
     """Return the values of the autopilot's parameters by name, with `stated_values` applied.
 
-    The cruise airspeed is the airspeed of the UAV.  Raises PlanflyError for values that are not allowed.
+    The cruise-airspeed parameter, if the autopilot has one, is overridden by the UAV's airspeed.
+
+    stated_values: values by name, in the units of the autopilot.
+    Raises PlanflyError for values that are not allowed.
     """
     uav = load_uav(scenario, stated_values)
     parameters = uav.autopilot.parameters
@@ -146,7 +149,7 @@ def run_flight_process(connection: Connection, options: ServeOptions) -> None:
 
 
 class ServedFlights:
-    """Factory of a flight process, which judges missions in the served scenario and opens flight logs."""
+    """Factory of a flight process: it prepares and judges missions in the served scenario, and opens flight logs."""
 
     def __init__(self, options: ServeOptions) -> None:
         """Load the scenario of the options, with its UAV."""
@@ -187,6 +190,8 @@ class ServedFlights:
 
         Returns the prepared flight, and the answer for the vehicle.  For a mission that cannot be flown, the flight is
         None and the answer states the reason.
+
+        request: the mission, with the parameters of the autopilot.
         """
         served_scenario = self._served
         try:
@@ -251,7 +256,10 @@ class ServedFlights:
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":
-        """Open a log with the next free name ``flight-NNN.mcap``.  mode: mode of the flight, such as `AUTO`."""
+        """Open a log with the next free name ``flight-NNN.mcap``.
+
+        mode: mode of the flight, such as `AUTO`.
+        """
         self._logs.mkdir(parents=True, exist_ok=True)
         number = 1
         while True:
@@ -283,9 +291,10 @@ class ServedLog:
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        If the aircraft left the path within a second, the log is deleted.  If the process must end, a path that was
-        left is not judged; `planfly check` can judge it later.
+        If the aircraft left the path within a second, the log is deleted.  If the process must end, a flight that left
+        its path is not judged; `planfly check` can judge its log later.
 
+        end_reason: reason why the flight ended.
         should_abort: see `planfly.workflow.reference_flights.explain_verdict`.
         """
         track = join_tracks(self._track_blocks)
@@ -339,6 +348,7 @@ def describe_unfinished_flight(basis: str, end_reason: str, verdict: Verdict) ->
     Findings of `_RULES_OF_UNFINISHED_PATHS` are left out.
 
     basis: basis of the verdict, such as "flown in GUIDED".
+    end_reason: reason why the flight ended.
     """
     failed_findings = [finding for finding in verdict.failed if finding.rule not in _RULES_OF_UNFINISHED_PATHS]
     findings_text = count_text(len(failed_findings), "finding") if failed_findings else "no findings"

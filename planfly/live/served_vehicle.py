@@ -31,7 +31,12 @@ def serve_vehicle(
     stop: Callable[[], bool],
     on_message: Callable[[str], None],
 ) -> None:
-    """Serve a MAVLink vehicle until `stop` returns True.  on_message: called with one line for each event."""
+    """Serve a MAVLink vehicle until `stop` returns True.
+
+    access: addresses of the vehicle and its stations, and the key of the link.
+    served_scenario: scenario as loaded from `options`.
+    on_message: called with one line for each event.
+    """
     with contextlib.ExitStack() as exit_stack:
         link = Link(access)
         exit_stack.callback(link.close)
@@ -75,7 +80,7 @@ def serve_vehicle(
 
 
 class _FlightPool:
-    """Pool of flight processes; the vehicle requests another process when one has died."""
+    """Flight processes of a vehicle, which requests another process when one has died."""
 
     def __init__(self, options: ServeOptions) -> None:
         """Start with no process; `spawn` starts the processes."""
@@ -103,7 +108,7 @@ class _FlightPool:
 
 
 def make_standby_at_start(scenario: Scenario) -> Standby:
-    """Return state and home of a vehicle without a mission.
+    """Return state and home of a vehicle that waits without a mission.
 
     The vehicle is at the scenario's start and heads for the destination.  Home is on the ground below the start, or at
     the altitude of the start without terrain.

@@ -51,11 +51,11 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def _loose_limits_text(plan: Plan, uav: Uav) -> str:
-    """Warn if the numbers in [limits] allow a turn or slope that the aircraft or its autopilot cannot fly.
+    """Return a warning if a plan has a turn or slope that the aircraft or its autopilot cannot fly; "" otherwise.
 
-    Returns "" if the plan stays within the limits of both.  The aircraft limits turns and slopes.  The autopilot limits
-    slopes by its climb and sink rates, of which a plan uses only a part: a steeper flight passes in some gusts and
-    fails in others.  The text names the first part of the plan that exceeds a limit.
+    The plan can have such a turn or slope only because of numbers in [limits].  The aircraft limits turns and slopes.
+    The autopilot limits slopes by its climb and sink rates, of which a plan uses only a part: a steeper flight passes
+    in some gusts and fails in others.  The text names the first part of the plan that exceeds a limit.
     """
     limits = uav.limits
     slope_limits = replace(limits, max_climb=None, max_dive=None)
@@ -79,9 +79,9 @@ def _loose_limits_text(plan: Plan, uav: Uav) -> str:
 
 
 def _short_strip_text(plan: Plan) -> str:
-    """Explain why a strip is too short for the expected touchdowns, and state the remedies.
+    """Return a text if the strip is too short for the expected touchdowns, with remedies; "" otherwise.
 
-    Return "" if the strip is long enough, or if the plan does not land on a strip.
+    It is also "" if the plan does not land on a strip.
     """
     strip, descent = (
         plan.scenario.landing,

@@ -1,4 +1,4 @@
-"""Altitude margin a plan needs because gusts can exceed the climb or sink rate of the aircraft.
+"""Give a plan the altitude margin that it needs because gusts can exceed the climb or sink rate of the aircraft.
 
 In a downdraft planfly's guidance descends rather than stall; in an updraft ArduPlane and PX4 climb rather than exceed
 their airspeed.  A plan is safe only if each leg has a margin for the altitude lost or gained in a gust, above its
@@ -58,10 +58,10 @@ _ROUNDING_TOLERANCE_M = 1e-6
 
 
 class Shortfall(NamedTuple):
-    """Hazard into which gusts may move the aircraft.
+    """Missing altitude margin: a hazard into which gusts may move the aircraft.
 
     gust: "downdrafts" or "updrafts".
-    depth: depth of the displacement into the hazard, m.
+    depth: distance by which gusts may move the aircraft into the hazard, m.
     hazard: text that begins with "into", "out of" or "above", and names the clearance, the missile, the zone or the
     height.
     place: text that names the leg or the end of the path.
@@ -138,7 +138,7 @@ def ensure_altitude_margin(plan: Plan, uav: Uav, search: Search | None = None) -
 
 
 def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
-    """Return True if gusts may displace an aircraft that has no climb or sink rate in reserve."""
+    """Return True if the plan's gusts displace an aircraft that has no climb or sink rate in reserve."""
     return any(
         displacement(0.0, plan.scenario.wind.turbulence)
         for _, displacement in _gust_displacements(plan.scenario, uav.autopilot)
@@ -148,9 +148,9 @@ def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the kinds of gusts to consider, each with the function that computes its displacement, m.
+    """Return the kinds of gusts to consider, each with the function that returns its vertical displacement, m.
 
-    The function's arguments are the climb or sink rate that the aircraft holds in reserve (m/s) and the turbulence.
+    The function's arguments are the climb or sink rate that the aircraft holds in reserve, m/s, and the turbulence.
     Updrafts are considered only if the scenario has zones or a maximum height.
     """
     deviations = autopilot.deviations
@@ -205,11 +205,11 @@ def _with_margin_at_threats(limits: Limits) -> Limits:
 
 
 def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
-    """Return True if a plan raised by `height_change` (m) exceeds the ceiling or the maximum height.
-
-    The result is False for 0 m.
+    """Return True if a plan exceeds the ceiling or the maximum height after it is raised; False for a change of 0.
 
     The ends of the plan are not raised, unless it has no other waypoints.
+
+    height_change: change of altitude, m.
     """
     if not height_change:
         return False
@@ -223,7 +223,7 @@ def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
 
 
 def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
-    """Return search limits for paths with the margin that gusts need at the plan's altitude.
+    """Return limits for a search for paths with the margin that gusts require at the given plan's altitude.
 
     unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
@@ -247,7 +247,7 @@ def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB
 
 
 def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
-    """Return search limits for alternatives to a safe plan, as strict as this plan allows.
+    """Return limits for a search for alternatives to a safe plan: the strictest limits for gusts that the plan meets.
 
     The limits with a margin for gusts at the ground, missiles and zones are tried first, then those with a margin at
     the ground only.  If the plan meets none of them, or gusts do not displace the aircraft, the limits have no such
@@ -287,7 +287,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
-    """Find for each kind of gust and hazard the place where the aircraft is displaced deepest into it.
+    """Return for each kind of gust and hazard the shortfall at the place where the aircraft gets deepest into it.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
@@ -325,9 +325,9 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
 
     Near an end of the path, the margin grows with the distance from the end.  Legs are not cut within turns.
 
-    waypoints: (w, 3) m.
-    margins: altitude that gusts may cost or add on each leg, (w - 1,) m.
-    end_margins: margin needed at both ends of the path, (2,) m.
+    waypoints: positions, (w, 3), m.
+    margins: altitude that gusts may cost or add on each leg, (w - 1,), m.
+    end_margins: margin needed at both ends of the path, (2,), m.
     """
     ends = waypoints[[0, -1]]
     tangents = turn_tangents(problem.certified.aircraft, waypoints) * _TANGENT_RATIO
@@ -355,10 +355,7 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Return (name, height above ground in m, index of the point) for both ends of a path.
-
-    The result is empty without terrain.
-    """
+    """Return (name, height above ground, m, index in `parts.points`) for both ends of a path; [] without terrain."""
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem always has terrain
         return []
@@ -393,10 +390,10 @@ def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the place where an updraft lifts the aircraft highest above ground.
+    """Return the shortfall at the place where an updraft lifts the aircraft highest above ground.
 
-    A place at the start or the destination is returned first, because no other path avoids it.  The depth is the height
-    above the maximum height, negative if the aircraft stays below.  Returns None without a maximum height.
+    A shortfall at the start or the destination is returned first, because no other path avoids it.  The depth is the
+    height above the maximum height, negative if the aircraft stays below.  Returns None without a maximum height.
     """
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
@@ -433,10 +430,7 @@ def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into or out of a zone, or None.
-
-    A gust may displace the aircraft into an exclusion zone or out of an inclusion zone.
-    """
+    """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone; None if none."""
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
@@ -452,9 +446,9 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return copies of a path (p, 3) that are displaced vertically by 1, 2, ... steps.
+    """Return copies of a path that are displaced vertically by 1, 2, ... steps, (p, 3), m, each.
 
-    The last copy has the full displacement of the gusts. A step is at most `_HEIGHT_STEP_M` high, so that no hazard is
+    The last copy has the full displacement by the gusts. A step is at most `_HEIGHT_STEP_M` high, so that no hazard is
     missed.
     """
     margins = np.maximum(parts.margin_before, parts.margin_after)

@@ -43,7 +43,7 @@ def limit_waypoint_orbits(
     must stay in the corridor, too.  If no such plan is found, the given plan is returned as not safe, with the reason
     in its certificate.
 
-    search: function that plans a scenario in the same way as the plan; None to search for no other path.
+    search: function that plans a changed scenario as the plan was made; None to search for no other path.
     search_limits: limits within which the plan was made; None for the limits of the aircraft.
     keeps_waypoints: True to keep the waypoints of the plan; a plan with too many is then returned as not safe.
 
@@ -110,7 +110,7 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
 
 
 def _is_safe_in_gusts(plan: Plan, uav: Uav) -> bool:
-    """Return True if gusts cause at most `MAX_EXPECTED_ORBITS`, and all corners stay in the corridor."""
+    """Return True if at most `MAX_EXPECTED_ORBITS` orbits are expected, and all corners stay in the corridor."""
     if expected_orbits(plan, uav.autopilot, uav.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_corner_excursions(plan, uav), default=0.0) <= _plan_corridor_half_width(plan, uav)
@@ -122,10 +122,7 @@ def _plan_corridor_half_width(plan: Plan, uav: Uav) -> float:
 
 
 def _corner_excursions(plan: Plan, uav: Uav) -> list[float]:
-    """Return the largest distance from the legs at each corner in gusts, m.
-
-    The result is empty without a tracking error.
-    """
+    """Return the largest distance from the legs at each corner in gusts, m; [] if the limits have no tracking error."""
     limits = uav.limits
     if (tracking := limits.tracking) is None:
         return []

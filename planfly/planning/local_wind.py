@@ -1,4 +1,4 @@
-"""Plans whose slopes and turns can be flown in the local wind of a forecast.
+"""Make plans whose slopes and turns can be flown in the local wind of a forecast.
 
 The planner limits slopes and turns in one mean wind for the whole map.  The wind of a forecast differs from it by
 place, height and time: a stronger tailwind flattens the slopes that the aircraft can fly, and widens its turns.
@@ -91,7 +91,7 @@ def ensure_local_wind(plan: Plan, uav: Uav, search: Callable[[Uav], Plan] | None
 
 
 def _plan_requirements(plan: Plan, uav: Uav) -> RouteRequirements:
-    """Return the requirements of a plan's mission.  Raises ForecastError as `ensure_local_wind` does."""
+    """Return the route requirements of a plan's mission.  Raises ForecastError as `ensure_local_wind` does."""
     return route_requirements(make_setup(plan.scenario, uav, mission_of_plan(plan, uav), plan.seed, plan=plan))
 
 
@@ -103,9 +103,11 @@ def _wind_failures(plan: Plan, requirements: RouteRequirements) -> list[Finding]
 
 
 def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
-    """Tighten limits so that a plan can be flown at `ratio` times the ground speed in the mean wind.
+    """Return limits within which a plan can be flown at a higher ground speed than in the mean wind.
 
-    Slopes over the ground are inversely proportional to the ground speed, and radii to its square.
+    Slopes over the ground are inversely proportional to the ground speed; radii are proportional to its square.
+
+    ratio: ratio of the higher ground speed to the ground speed in the mean wind.
     """
 
     def flatten(angles: Floats) -> Floats:
@@ -126,9 +128,9 @@ def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
 def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float) -> float:
     """Return the largest ratio of local-wind to mean-wind ground speed on the whole map, at least 1.
 
-    All courses, all altitudes between floor and ceiling and the times of a flight are compared.
+    Sampled courses, positions, altitudes between floor and ceiling, and times of a flight are compared.
 
-    airspeed: m/s.
+    airspeed: true airspeed, m/s.
     duration: duration of the flight, s.
     """
     (west, east), (south, north) = scenario.bounds.tolist()
@@ -143,8 +145,8 @@ def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, co
     """Return the largest ratio of local-wind to mean-wind ground speed at samples, at least 1.
 
     samples: (n, 4) east, north and altitude, m, and time after take-off, s.
-    courses: (n,) rad, or (c, 1) to combine each of c courses with each sample.
-    airspeed: m/s.
+    courses: course at each sample, rad, (n,), or (c, 1) to combine each of c courses with each sample.
+    airspeed: true airspeed, m/s.
     """
     local_winds = scenario.wind_velocities(samples[:, :3], samples[:, 3])
     mean_winds = scenario.wind.velocities_at(np.ascontiguousarray(samples[:, 2]))

@@ -45,7 +45,7 @@ STRIP_HALF_WIDTHS_M = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeededPlan:
-    """Values of one plan for tables and figures.
+    """Values of a plan that was made with one seed, for tables and figures.
 
     threats: number of threats in the problem.
     waypoints: world coordinates, m, (w, 3).
@@ -104,19 +104,18 @@ class TableRow:
 
 
 def problem_name(threats: int) -> str:
-    """Return the name of the built-in scenario of a problem."""
+    """Return the name of the built-in scenario of a problem, by its number of threats."""
     return f"paper-{threats:02d}"
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return the probability of a kill or detection on a path.
+    """Return the probability of at least one kill or detection on a path, with its points treated as independent.
 
-    The points of the path, six per leg, are treated as independent.
-
+    The points are the path's six per leg, and its end.
     The probability at a point is min(1, (scale / d)^4) for a threat at distance d within its radius.  The paper's sums
     (eq. 9, 10) over the same points have no upper bound.
 
-    waypoints: (w, 3) m.
+    waypoints: positions, (w, 3), m.
     kind: "kill" or "detection".
     """
     fractions = np.arange(6)[:, None] / 6.0
@@ -170,6 +169,8 @@ def plan_section(
 
     The order does not depend on the number of processes.
 
+    problems: numbers of threats, which name the problems.
+    seeds: number of seeds.
     algorithm: algorithm in place of the paper's; the strip and the baselines are always planned, too.
     jobs: number of processes; None for one per available core.
     advance: function called with the progress after each plan.
@@ -301,7 +302,7 @@ def table_text(rows: Sequence[TableRow]) -> str:
 
 
 def _number_text(value: float | None, digits: int) -> str:
-    """Format a number with the given number of decimals; "-" for None."""
+    """Return a number as text with a number of decimals (`digits`); "-" for None."""
     return "-" if value is None else f"{value:.{digits}f}"
 
 
@@ -336,7 +337,7 @@ def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededP
 
 
 def _plan_row(seeded_plan: SeededPlan) -> dict[str, Any]:
-    """Return the values of a plan, keyed by column."""
+    """Return the values of a plan for its row in runs.csv and runs.json, keyed by column."""
     row: dict[str, Any] = {
         "threats": seeded_plan.threats,
         "algorithm": seeded_plan.algorithm,
@@ -368,7 +369,10 @@ _PLAN_COLUMNS = [
 
 
 def _csv_text(columns: Sequence[str], rows: Any) -> str:
-    """Return CSV text with a header of column names.  rows: lists of values in the order of the columns."""
+    """Return CSV text with a header of column names.
+
+    rows: iterable of rows, each with its values in the order of the columns.
+    """
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
@@ -377,7 +381,7 @@ def _csv_text(columns: Sequence[str], rows: Any) -> str:
 
 
 def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
-    """Draw the paper's figures 5-8 (paths) and 9-12 (encodings), and the convergence over generations."""
+    """Draw the paper's figures 5-8 (paths) and 9-12 (encodings), and the convergence over generations, as PNG files."""
     from logs.views.drawing import write_png
     from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 

@@ -11,8 +11,8 @@ _VALID_UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
 class Certificate(NamedTuple):
     """A self-signed TLS certificate and its private key, as PEM text.
 
-    Both are kept in the memory of the run's processes.  Python's TLS can load them only from files, which exist for
-    that moment in a temporary folder that only their user can read.
+    Both are kept in memory.  Python's TLS can load them only from files, which exist only during the loading, in a
+    temporary folder that only the user of the process can read.
     """
 
     certificate: str

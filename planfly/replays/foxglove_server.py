@@ -42,12 +42,18 @@ def play_to_foxglove(
     should_stop: ShouldStop,
     on_message: OnMessage,
 ) -> None:
-    """Start a Foxglove server, and play the messages of a log from `start` to `end` (s) to its clients.
+    """Start a Foxglove server, and play the messages of a log to its clients.
 
+    Clients that subscribe later than the first one receive the current scenes.
+
+    start, end: start and end in flight time, s.
+    speed: multiple of real time.
+    port: port of the server; 0 for any free port.
     allowed: origins of web pages that are accepted in addition to `planfly.replays.origin_gate.VIEWERS`.
-
-    The server waits at most ``wait`` seconds for the first client that subscribes.  Later clients receive the current
-    scenes.  Raises FlightError if no client subscribes in time, and OSError for a port in use.
+    wait: maximum time to wait for the first client that subscribes, s; None to wait without a limit.
+    should_stop: polled continuously; the replay ends when it returns True.
+    on_message: called with each line for the user.
+    Raises FlightError if no client subscribes in time, and OSError for a port in use.
     """
     import foxglove
 
@@ -141,7 +147,11 @@ class _Broadcast:
         self._waiting: list[tuple[float, str]] = []
 
     def record_scenes_until(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
-        """Store each topic's last scene before `start_ns`, and return the messages from `start_ns` on."""
+        """Store each topic's last scene before a time, and return the messages from this time on.
+
+        messages: messages of the log in the order of time; those before `start_ns` are consumed.
+        start_ns: log time, ns.
+        """
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)
@@ -149,7 +159,7 @@ class _Broadcast:
         return iter(())
 
     def send(self, message: LogMessage) -> None:
-        """Send a message to the subscribers."""
+        """Send a message to the subscribers of its topic, after the newest scenes to new subscribers."""
         self.serve_new_subscribers()
         self._record_scene(message)
         channel = self._channels.get(message.channel.topic)
@@ -175,7 +185,7 @@ class _Broadcast:
             self._scenes[message.channel.topic] = message
 
     def on_subscribe(self, client: Any, channel: Any) -> None:
-        """Record a new subscriber of a topic; called in a thread of the server."""
+        """Queue a new subscription, and increase the number of subscribers; called in the server's thread."""
         self._arrivals.put((time.monotonic(), channel.topic))
         self.listeners += 1
 

@@ -35,9 +35,7 @@ SUFFIXES = (".gif", ".mp4")
 def write_movie(
     log: FlightLog, target: Path, start: float, end: float, *, speed: float | None, overwrite: bool
 ) -> list[Path]:
-    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on.
-
-    Returns the files.
+    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on; return the files.
 
     start, end: start and end in flight time, s.
     speed: multiple of real time; None for a film of 20 s.
@@ -86,10 +84,7 @@ def _yield_frames(film: MovieFrames) -> Iterator[Image.Image]:
 
 
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
-    """Return a frame with its colours replaced by the nearest colours of a palette.
-
-    The result has no transparent pixels.
-    """
+    """Return a frame with each colour replaced by the nearest colour of a palette, without transparent pixels."""
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
     opaque = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))
@@ -98,7 +93,7 @@ def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
 
 
 def _encode_gif(film: MovieFrames) -> bytes:
-    """Encode a film as GIF with one palette.
+    """Return a film encoded as GIF, with one palette.
 
     Each frame contains only the pixels that differ from the frame before.
     """
@@ -142,11 +137,10 @@ def _encode_gif(film: MovieFrames) -> bytes:
 
 
 def _encode_mp4(film: MovieFrames, program: str) -> bytes:
-    """Encode a film as MP4 with ffmpeg.
-
-    Raises OSError with the last line of ffmpeg's output if ffmpeg fails.
+    """Return a film encoded as MP4 by ffmpeg.
 
     program: path of ffmpeg.
+    Raises OSError with the last line of ffmpeg's output if ffmpeg fails.
     """
     frames = film.frames()
     first_frame = next(frames)

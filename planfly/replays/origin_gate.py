@@ -59,10 +59,7 @@ def find_refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str
 
 
 def _format_header(values: list[str]) -> str:
-    """Return the values of a header as text for a terminal, without control characters.
-
-    Without values the text is "no host".
-    """
+    """Return the values of a header as a short text without control characters; "no host" without values."""
     return ascii(", ".join(values))[1:-1][:_MAX_REPORTED_LENGTH] or "no host"
 
 
@@ -70,7 +67,7 @@ class OriginGate:
     """Listener on a port of this machine that forwards accepted connections to a server behind it."""
 
     def __init__(self, port: int, allowed: Collection[str], on_refused: Callable[[str], None]) -> None:
-        """Open the port of the gate.
+        """Open the port of the gate; connections wait until `start_forwarding`.
 
         port: port number; 0 for any free port.
         allowed: origins of web pages that are accepted.
@@ -89,7 +86,11 @@ class OriginGate:
         self._closed = asyncio.Event()
 
     def start_forwarding(self, port: int, certificate: Certificate) -> None:
-        """Start forwarding to a TLS server with this certificate, which no browser trusts."""
+        """Start forwarding accepted connections to a TLS server on this machine.
+
+        port: port of the server.
+        certificate: certificate of the server, which no browser trusts.
+        """
         self._server_port = port
         self._tls = ssl.create_default_context(cadata=certificate.certificate)
         self._loop = asyncio.new_event_loop()
@@ -128,7 +129,7 @@ class OriginGate:
         connection.add_done_callback(self._connections.discard)
 
     async def _serve_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Read a request; refuse it, or forward all data between the client and the server."""
+        """Read the head of a request; refuse the request, or forward all data between the client and the server."""
         with contextlib.closing(writer), contextlib.suppress(OSError, asyncio.IncompleteReadError):
             try:
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_S)

@@ -79,14 +79,18 @@ class _Player:
     """Sender of a log's telemetry to ground stations, in place of a vehicle."""
 
     def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
-        """Take the link to the stations, and the state of the vehicle that they see."""
+        """Take over a link to stations.
+
+        status: state of the vehicle, which the stations see.
+        on_message: called with each text for the user.
+        """
         self._link, self._status, self._on_message = link, status, on_message
         self._start_time = link.clock()
         self._next_heartbeat = 0.0
         self._text_count = 0
 
     def announce(self, text: str) -> None:
-        """Send a text to all stations, and report it to the caller."""
+        """Send a text to all stations, and pass it to `on_message`."""
         self._on_message(text)
         self._text_count += 1
         for peer in self._link.peers.values():
@@ -94,13 +98,13 @@ class _Player:
                 self._link.send(piece, peer)
 
     def wait(self, timeout: float, should_stop: ShouldStop) -> None:
-        """Call stations until one answers, or for ``timeout`` seconds."""
+        """Send heartbeats until a station answers, `timeout` seconds have passed, or `should_stop` returns True."""
         end = self._link.clock() + timeout
         while not self._link.peers and self._link.clock() < end and not should_stop():
             self.step(pause=0.05)
 
     def continue_sending(self, seconds: float, should_stop: ShouldStop) -> None:
-        """Send the last snapshot for a number of seconds."""
+        """Keep sending the last snapshot for a number of seconds, or until `should_stop` returns True."""
         end = self._link.clock() + seconds
         while self._link.clock() < end and not should_stop():
             self.step(pause=0.02)

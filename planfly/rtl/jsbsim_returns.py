@@ -48,12 +48,10 @@ class NearestApproaches(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Simulate a return in JSBSim.
+    """Simulate a return to launch in JSBSim; return its minimum height above ground and distance from kill spheres, m.
 
-    Returns its minimum height above ground and its minimum distance from kill spheres, m.
-
-    The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  Returns None for a
-    return that cannot be flown.
+    The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  The result is None for
+    a return that cannot be flown.
 
     start: a record of `flight.autopilots.simulated_returns.RETURN_START`.
     """
@@ -93,11 +91,12 @@ def return_setup(world: ReturnWorld, start: Record, landing: LandingStart | None
 
 
 def positions_from_start(track: Track, start: Record) -> Floats | None:
-    """Return the positions (t, 3) of a flight from the start of the return to the end, m.
+    """Return the positions of a flight from the start of its return to launch to the end, (t, 3), m.
 
-    The return starts at the row nearest to `start`, among the rows of the first 100 s; the lead-in before it is
-    shorter.  Returns None if the flight does not reach the start of the return, or passes it too high or too low.
+    The return to launch starts at the row nearest to `start`, among the rows of the first 100 s; the lead-in before it
+    is shorter.  The result is None if the flight does not reach this point, or passes it too high or too low.
 
+    track: flight with the lead-in and the return to launch.
     start: a record of `flight.autopilots.simulated_returns.RETURN_START`.
     """
     start_position = np.array([float(start["east"]), float(start["north"])])
@@ -111,7 +110,7 @@ def positions_from_start(track: Track, start: Record) -> Floats | None:
 def find_nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproaches:
     """Find the points of a path that are closest to the ground and to missiles.
 
-    positions: path points, (t, 3) m.
+    positions: path points, (t, 3), m.
     """
     clearance, lowest_position = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
@@ -131,9 +130,9 @@ def find_nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApp
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """Make a mission that flies through the start of a return and then commands RTL.
+    """Make a mission that flies through the start of a return to launch, and then commands RTL.
 
-    The mission passes the start on the flight's course and slope at this point.
+    The mission passes this point on the course and slope that the flight has there.
     """
     east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))

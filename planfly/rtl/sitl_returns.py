@@ -55,11 +55,11 @@ _ROWS_PER_SECOND = 60
 
 @dataclass(frozen=True, slots=True)
 class ProgramReturn:
-    """One return as flown by the simulated ArduPlane and by the program.
+    """One return to launch, by the simulated ArduPlane and by the program.
 
     simulated: the return by the simulated ArduPlane, as judged.
-    flown: the return by the program, or None if the program could not fly it.
-    reason: reason why the program could not fly the return, or "".
+    flown: the return by the program; None if the program could not fly it.
+    reason: reason why the program could not fly the return; "" if it flew.
     log: the log of the flight, or None if it was not kept.
     """
 
@@ -84,10 +84,10 @@ class ProgramReturn:
 
 @dataclass(frozen=True, slots=True)
 class ProgramReturns:
-    """Returns that the program flew.
+    """Returns to launch that the program was to fly.
 
     program: name and version of the program; "" if the program flew none of the returns.
-    pairs: the returns, the worst first.
+    pairs: each return, simulated and flown, the worst first.
     """
 
     program: str
@@ -141,7 +141,7 @@ class ProgramReturns:
         return texts
 
     def with_worse_results(self, returns: Returns) -> Returns:
-        """Return the returns with the program's result wherever it is worse than the simulated result."""
+        """Return a copy of the simulated returns with the program's result wherever it is worse."""
         worse_result_by_id = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
             returns,
@@ -152,7 +152,7 @@ class ProgramReturns:
 
 
 def check_is_arduplane(program: Path) -> None:
-    """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
+    """Raise ArgumentError if a program is not an ArduPlane executable; planfly flies returns only with ArduPlane."""
     autopilot_class = find_program_class(program)
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected an ArduPlane executable; returns by a real {autopilot_class.title} are not supported"
@@ -160,7 +160,7 @@ def check_is_arduplane(program: Path) -> None:
 
 
 def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
-    """Raise ArgumentError if the simulated returns are not ArduPlane's, so that its program cannot check them."""
+    """Raise ArgumentError if the returns to launch are not simulated with ArduPlane, which its program could check."""
     if not isinstance(world.autopilot, ArduPlane):
         allowed = f"the program of ArduPlane cannot check the returns of {world.autopilot.title}"
         raise ArgumentError.of_argument("sitl", str(program), allowed)
@@ -209,7 +209,7 @@ def choose_worst_returns(
 def fly_with_autopilot(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, max_returns: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `max_returns` of the worst returns with the real ArduPlane autopilot (SITL).
+    """Fly at most `max_returns` of the worst returns to launch with the real ArduPlane (SITL), and judge them.
 
     The wind is the mean wind, and the navigation is exact.
 
@@ -244,7 +244,7 @@ def fly_with_autopilot(
 def _judge_flown_return(
     world: ReturnWorld, simulated_return: SimulatedReturn, start: Record, track: Track, end_reason: str
 ) -> SimulatedReturn | None:
-    """Judge a return that the autopilot program flew, by the same rules as a simulated return.
+    """Judge a return to launch that the autopilot program flew, by the same rules as a simulated one.
 
     simulated_return: simulation of the same return; its required height and its energy at the start are used.
     start: position and velocity at the start of the return.
@@ -300,9 +300,9 @@ def _judge_flown_return(
 
 
 def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
-    """Return the position where the judgement of a return ends.
+    """Return the position up to which a return to launch is judged.
 
-    The position is the loiter centre, or the last waypoint before the landing.
+    It is the loiter centre, or the last waypoint before the landing.
     """
     if target.landing is None:
         return target.position
@@ -310,18 +310,19 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
 
 
 def _cut_at_nearest_point(point: tuple[float, float, float], position: Floats) -> Floats:
-    """Return the part of a path up to its nearest point to `point`.  position: path points, (t, 3) m."""
+    """Return the part of a path up to the path point nearest to `point`.
+
+    position: path points, (t, 3), m.
+    """
     return position[: int(np.argmin(np.linalg.norm(position - np.array(point), axis=1))) + 1]
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target of a flown return.
+    """Return the target of a flown return to launch: the one at which the path ends, or for which it heads at the end.
 
-    It is the target at which the path ends, or for which the last course heads.
+    All possible targets are tried.  If none fits, the target of the simulated ArduPlane is returned.
 
-    All possible targets of a return are tried.  If none fits, the target of the simulated ArduPlane is returned.
-
-    position: path points, (t, 3) m.
+    position: path points, (t, 3), m.
     """
     end_point = position[-1, :2]
     # The last course is the course over the last five seconds.

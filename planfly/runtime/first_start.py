@@ -26,13 +26,11 @@ _END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Compile the kernels of `planfly.kernel_units` in several processes.
-
-    Returns when each unit is ready or has failed.
+    """Compile units of `planfly.kernel_units` in `PROCESS_COUNT` processes; return when each is ready or has failed.
 
     units: names of units, the unit that takes longest first.
     folder: cache folder of the kernels.
-    on_ready: called with the number of kernels that are ready.
+    on_ready: called with the number of kernels that are ready so far.
     The processes end with this call, even if it raises an error, and with this process.
     """
     remaining_units, lines = deque(units), queue.SimpleQueue[str]()
@@ -79,9 +77,12 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
 def _feed_process(
     process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
 ) -> None:
-    """Send unit names to a process, one after another, and queue the lines that it prints.
+    """Send unit names to a process, one after another, and queue the lines that it prints; run in a thread.
 
     `_END_OF_OUTPUT` is queued when no unit remains or the process has died.
+
+    remaining_units: names of the units that no process has started; shared by the threads.
+    lines: queue for the printed lines.
     """
     requests, answers = process.stdin, process.stdout
     # The process may have died, or the other process may have taken the last unit.

@@ -23,7 +23,7 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Make garbage collection rare, and limit linear algebra to one thread.
+    """Make garbage collection rare in this process and its children, and limit linear algebra to one thread.
 
     Call this function before NumPy is imported.
 
@@ -43,7 +43,7 @@ def prepare_child() -> None:
     """
     if _OWN_PROCESS_VARIABLE in os.environ:
         gc.set_threshold(_MIN_OBJECTS_TO_COLLECT, 50, 50)
-        watch_address_space()
+        guard_imports()
 
 
 def end_repeated_call() -> None:
@@ -74,11 +74,8 @@ def check_script_guard(workers: "Iterable[BaseProcess]") -> None:
     raise PlanflyError(f"{script}: {reason}", file=script) from None
 
 
-def watch_address_space() -> None:
-    """Make imports fail early if a module does not fit into a limited address space.
-
-    Without a limit nothing is changed.
-    """
+def guard_imports() -> None:
+    """If the address space of this process is limited, make imports fail early for modules that do not fit into it."""
     limit = address_space_limit()
     if limit is None:
         return
@@ -104,9 +101,7 @@ def address_space_limit() -> int | None:
 
 
 def with_large_stack(function: Callable[[], _Result]) -> _Result:
-    """Call a function with the frames of all inner calls in one large piece of memory.
-
-    Returns the result of the function.
+    """Call a function with the frames of all inner calls in one large piece of memory; return the function's result.
 
     CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty. Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating

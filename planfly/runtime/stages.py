@@ -20,7 +20,7 @@ Advance = Callable[[float, float, str], None]
 class Receiver(NamedTuple):
     """Receiver of progress.
 
-    stage: function that starts a stage with its title and its kind, and returns the function that takes its progress.
+    stage: function of title and kind that returns the context of a stage, which yields the function for its progress.
     report_line: function that takes a line that belongs to no stage.
     """
 
@@ -57,7 +57,7 @@ def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
 
 
 def report_line(line: str) -> None:
-    """Report a line about the work; without a receiver it is logged as a warning."""
+    """Send a line about the work to the receiver; without a receiver, log it as a warning."""
     receiver = _receiver.get()
     if receiver is not None:
         receiver.report_line(line)
@@ -69,7 +69,7 @@ def report_line(line: str) -> None:
 
 
 def report_replaced(*files: Path) -> None:
-    """Report each existing file that the caller is about to replace."""
+    """Report those of the files that exist, and that the caller is about to replace."""
     for file in files:
         if file.exists():
             report_line(f"{file} exists and is replaced")

@@ -77,7 +77,7 @@ class Restored(NamedTuple):
 def autosave_text(
     context: EditContext, document: Document, history: History, plan: Plan | None, *, is_in_file: bool
 ) -> str:
-    """Encode the state of a session as the JSON text of its autosave file.
+    """Return the JSON text of a session's autosave file.
 
     Of the edits in effect the newest are saved, see `_steps_to_save`; of the undone edits, the first
     `_MAX_UNDONE_STEPS`.
@@ -105,7 +105,7 @@ def autosave_text(
 
 
 def settings_data(context: EditContext) -> Json:
-    """Return the settings of an editing context as plain data, and the name of their scenario."""
+    """Return plain data of an editing context: name of the scenario, its settings, and the changed parameters."""
     spec = context.scenario.to_json()
     # An area made around a mission is not saved; it is made again when the mission is restored.
     names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
@@ -123,7 +123,10 @@ def _step_data(step: Step) -> list[Any]:
 
 
 def _step_from_data(data: list[Any], opened_mission: Mission) -> Step:
-    """Return an edit from its data; an older version of planfly wrote no parameters."""
+    """Return the edit of data from `_step_data`; older versions of planfly wrote no parameters.
+
+    opened_mission: mission from which the fields that are not in the data are taken.
+    """
     mission, text, *parameters = data
     changes = (ParameterChange(*change) for change in (parameters[0] if parameters else ()))
     return Step(mission_from_data(mission, opened_mission), str(text), tuple(changes))
@@ -156,10 +159,12 @@ def _scenario_name(context: EditContext) -> str:
 def read_autosave(
     file: Path, context: EditContext, document: Document, options: MissionOptions, settings: Json | None = None
 ) -> Restored | None:
-    """Return the state of a session from its autosave; None if there is no file, or if another version wrote it.
+    """Return the state of a session from its autosave; None if there is no file, or if it has another schema.
 
-    If the opened mission is not the mission in which the edits were made, only the settings are restored.
+    If the opened mission is not the mission in which the edits were made, only the settings are restored.  If the
+    settings cannot be restored, only the mission is restored.
 
+    context: editing context of the opened document, before the saved settings.
     options: options of the command line, which replace saved settings.
     settings: settings of the session, which replace all saved settings of the same scenario; None for a new session.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
@@ -224,10 +229,11 @@ def sibling_autosave_path(file: Path, opened_mission: Mission) -> Path:
 def restore_settings(
     context: EditContext, data: Json, options: MissionOptions, *, file_autopilot: bool = False
 ) -> tuple[EditContext, tuple[str, ...]]:
-    """Return the editing context with the saved settings, and texts on saved settings that were replaced.
+    """Return the editing context with the saved settings, and texts on saved settings that were not restored.
 
-    The context is `context` itself if the settings do not differ.
+    The context is `context` itself if the settings do not differ, or belong to another scenario.
 
+    data: saved settings, as from `settings_data`.
     options: options of the command line, which replace saved settings.
     file_autopilot: True if the autopilot of the opened file replaces the saved autopilot.
     """
@@ -271,7 +277,7 @@ def restore_settings(
 
 
 def _replace_entries(saved_spec: Json, opened_spec: Json, table: str, keys: tuple[str, ...]) -> list[str]:
-    """Replace entries in a table of a saved scenario by the entries of the opened scenario.
+    """Replace entries in a table of a saved scenario, in place, by the entries of the opened scenario.
 
     Returns a text with both values for each entry that was different.
 
@@ -297,7 +303,7 @@ def _is_same_value(first: object, second: object) -> bool:
 
 
 def _value_text(value: object) -> str:
-    """Return a value of a scenario as text; a path is reduced to its name."""
+    """Return a number or a text of a scenario as text; a path is reduced to its name, and None becomes "none"."""
     return "none" if value is None else Path(value).name if isinstance(value, str) else f"{value:g}"
 
 

@@ -33,7 +33,8 @@ class PlaceResult(NamedTuple):
     """Result of a rule at a place.
 
     ok: True if the place passes the rule, False if it fails, None if it was not judged.
-    value, margin: value and margin in ``unit``, or None without any.
+    value: flown value, or the planned value without a flown one, in ``unit``; None if unknown.
+    margin: margin to the limit, in ``unit``; None if unknown.
     cause: reason of a failure whose value is within the limit and so does not show it; "" otherwise.
     place: description of the place, with the item numbers of its own mission.
     scale: smallest noticeable difference of the margin.
@@ -76,10 +77,11 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect a flight's result for each rule and place; the worst one if a place was flown repeatedly.
+    """Return a flight's result for each rule and place; the worst result if the place was flown repeatedly.
 
-    seconds: duration of the flight, s.
+    route: route of the mission.
     findings: findings of the flight's verdict.
+    seconds: duration of the flight, s.
     """
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
@@ -138,13 +140,13 @@ def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return a key and a description of a place; the key has the positions of its items in the mission.
+    """Return a key of a place for comparisons, and a description for the user.
 
-    An edit renumbers items, so the key has their positions in the list of items instead of their numbers.  The
-    description has the numbers.
+    The key has the positions of its items in the mission's list, by which items of an edited mission are matched; the
+    description has their numbers.
 
     route_items: item number of each waypoint.
-    order: position of each item number in the mission.
+    order: position in the mission's list by item number.
     """
     if place.kind == "leg" and place.index is not None:
         first_item, last_item = (route_items[place.index + k] for k in (0, 1))
@@ -186,10 +188,10 @@ def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tupl
 
 
 def describe_changes(previous: FlightResults | None, current: FlightResults) -> list[str]:
-    """Return lines on what changed since the previous flight.
+    """Return lines on the differences between a flight and the previous flight.
 
-    The lines state the changed answers, or the changed values if no answer changed.  The result is ["nothing"] without
-    a change, and [] for the first flight.
+    The lines state new and ended failures, or changed values if there are none, and a difference in duration.  The
+    result is ["nothing"] without a difference, and [] without a previous flight.
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))
@@ -268,9 +270,12 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:
-    """Describe a change at a place: rule, old value (if of the same level), new value and state.
+    """Return a line on a change at a place: rule, old and new value, and state.
 
-    If the values do not show a failure, its cause replaces them.
+    A cause that the values do not show replaces them.  Values of another level than the failure are omitted.
+
+    old_result: result before the change; None to state only the value of `result`.
+    state_text: text on the change, such as "now passes".
     """
     causes = [shown.cause for shown in (result, old_result) if shown is not None and shown.cause]
     if causes:
@@ -307,9 +312,9 @@ def _quantity_name(rule: str) -> str:
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return lines on values that changed: of failures that continue, and of the closest place of a rule.
+    """Return lines on changed values: first of failures that continue, then of the place closest to each rule's limit.
 
-    At most `_MAX_VALUE_CHANGES` lines of each kind are returned, the largest changes of margin first.
+    At most `_MAX_VALUE_CHANGES` lines of each of the two are returned; the latter with the largest changes first.
     """
     failures = [
         (rule, old_results[rule, key], result)

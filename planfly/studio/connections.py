@@ -21,9 +21,9 @@ _numbers = itertools.count()
 
 
 class _UnknownConnection:
-    """Connection that has not given a token.
+    """Connection that is unknown until it gives a token.
 
-    If there are more than `MAX_UNKNOWN_CONNECTIONS`, the oldest is closed.
+    If more than `MAX_UNKNOWN_CONNECTIONS` connections are unknown, the oldest is closed.
 
     number: position in the order of connections, or None if the connection has given a token or is ending.
     """
@@ -43,10 +43,7 @@ class _UnknownConnection:
 
 
 class ShortLivedHttpProtocol(_UnknownConnection, H11Protocol):
-    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`.
-
-    Otherwise idle connections would accumulate.
-    """
+    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`, so that idle connections do not accumulate."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Register the connection, and schedule its closing in case no websocket replaces HTTP by then."""
@@ -82,7 +79,7 @@ class BoundedWebSocketProtocol(_UnknownConnection, WebSocketsSansIOProtocol):
         scope[ALLOW_FULL_SIZE] = self._allow_full_size
 
     def _allow_full_size(self) -> None:
-        """Stop counting the connection as unknown, and allow messages of full size."""
+        """Make the connection known, and allow messages of full size, because it has given the token."""
         self.number = None
         self._limit_messages(self.config.ws_max_size)
 

@@ -69,8 +69,9 @@ class Document:
     name: name shown to the user.
     stem: stem of the file names under which it is saved.
     setup: setup of the opened mission.
-    kind: key in `KINDS`, or "" if the document was not a mission file.
-    data: bytes of the file; an unchanged mission is saved as these bytes.
+    kind: key in `KINDS`, or "" if the document was not a mission file that the studio can write.
+    data: bytes of the file, which are saved again if an unchanged mission is saved in the same format; empty if `kind`
+        is "".
     path: the file that the command named, which the page may overwrite; None for any other document.
     on_disk: bytes of this file when it was last read or written.
     to_plan: True for a scenario that has no path yet.
@@ -189,12 +190,18 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
-    """Return the flight setup of the mission in a log, with the UAV of `scenario`."""
+    """Return the flight setup of the mission in a log, with the UAV of its scenario.
+
+    seed: seed of the flight.
+    """
     return make_setup(scenario, load_uav(scenario), mission, seed)
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
-    """Return a placeholder plan: the straight line from start to destination, not certified."""
+    """Return a placeholder plan: the straight line from start to destination, which no check has certified.
+
+    seed: seed that the plan states.
+    """
     line = np.stack([scenario.start, scenario.destination])
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
     counts, objectives = Violations(0, 0, 0, 0), Objectives(1.0, 0.0, 0.0, 0.0)
@@ -279,9 +286,9 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
 
 
 def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str, ...]:
-    """Return lines on settings and parameters that a ground station's file cannot store.
+    """Return lines on settings and parameters that were changed in the studio, and that a mission file cannot store.
 
-    Only settings whose values differ from those at the opening are included.
+    opened_setup: setup as opened, with the settings before the changes.
     """
     opened, current = (
         settings_json(scenario, uav, context.parameters, {})
@@ -296,16 +303,15 @@ def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
-    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store.
-
-    Returns () if no parameter was set.
-    """
+    """Return one line on the autopilot parameters set in the studio, which only a .parm file stores; () without any."""
     count = len(context.parameters.values)
     return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
 
 
 def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> Plan:
-    """Make a plan from the waypoints of an edited route, certified like the planner's plans.
+    """Make a plan from the waypoints of an edited route, and certify it as the planner does.
+
+    An opened plan that was not changed is returned with its certificate.
 
     Raises MissionError for a mission without a scenario, and for items that a plan cannot store.
     """
@@ -352,7 +358,7 @@ def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
     """Return a plan of the edited waypoints with the opened plan's departure and approach.
 
-    Returns None if the opened plan has neither.
+    Returns None without an opened plan, and if it has neither departure nor approach.
 
     Departure and approach were certified together with the turns at their ends, so the adjacent legs must be unchanged.
     Raises MissionError if these legs were changed.

@@ -40,7 +40,10 @@ class EditContext(MissionContext):
     def from_setup(
         cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES
     ) -> "EditContext":
-        """Make the editing context of an opened mission or plan."""
+        """Make the editing context of an opened mission or plan.
+
+        terrain, fences: as the attributes.
+        """
         return cls(
             setup.scenario,
             uav_of_setup(setup),
@@ -66,9 +69,9 @@ class EditContext(MissionContext):
         return replace(self, opened_setup=setup, planned=True)
 
     def planning_uav(self, mission: Mission, index: int | None = None) -> Uav:
-        """Return the UAV at the commanded airspeed of a mission, for planning a new path.
+        """Return the UAV at the airspeed that the mission commands where a new path starts.
 
-        index: index of the item at which the path starts; None for the airspeed of the first leg.
+        index: index of the item at which the path starts; None for a path from the start of the mission.
         """
         route, leg = self.route(mission), 0
         if index is not None:
@@ -83,10 +86,9 @@ class EditContext(MissionContext):
         return replace(self.uav, limits=new_limits)
 
     def with_area_around_mission(self, mission: Mission) -> "EditContext":
-        """Return a context whose scenario has an area that contains the mission.
+        """Return the context, with a larger scenario if the mission comes close to the edges of its area.
 
-        If planfly made the scenario around the mission, and the mission comes close to its edges, a larger scenario is
-        made.  A named scenario is kept.
+        Only a scenario that planfly made around the mission is replaced; a named scenario is kept.
         """
         if not self.scenario.external:
             return self
@@ -122,9 +124,11 @@ class EditContext(MissionContext):
         return with_end_courses(route, self.scenario, uav.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
-        """Return a setup for judging a route, which may be only a part of the mission's route.
+        """Return a setup for judging a route by its geometry.
 
-        Unlike the setup of a flight, it is made without checks, and without path and notes.
+        Unlike `make_setup`, it makes no checks, path or notes.
+
+        route: the mission's route, or a part of it.
         """
         uav = self.uav_for_mission(mission)
         return FlightSetup(

@@ -19,9 +19,10 @@ _SEARCHED_BYTES = 2**20
 
 
 def folder_message(folder: Path | None) -> Json:
-    """Return a message for the page with the missions, plans, logs and parameter files of a folder.
+    """Return a message for the page with the missions, plans, logs and parameter files of a folder, by name.
 
-    Links to files in other folders are left out, as are text files and JSON documents without a mission.
+    At most `_MAX_FILES` are listed.  Links to files in other folders are left out, and so are text files and JSON
+    documents without a mission.  The list is empty for no folder, and for one that cannot be read.
 
     >>> folder_message(Path("no such folder"))["files"]
     []
@@ -59,8 +60,9 @@ def home_relative_text(path: Path) -> str:
 
 
 def find_file_in_folder(folder: Path | None, name: str) -> Path:
-    """Return the path of a file in the folder, by its name.
+    """Return the full path of a file in the folder or its subfolders.
 
+    name: path of the file relative to the folder.
     Raises MissionError for a file that does not exist, is outside the folder, or has an unknown type.
 
     >>> find_file_in_folder(Path("/tmp"), "../etc/passwd")

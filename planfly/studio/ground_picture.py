@@ -46,7 +46,7 @@ class GroundGrid:
 
 
 def sample_ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
-    """Return a coarse grid of terrain altitudes for the page.
+    """Return a grid of terrain altitudes for the page, with `_GRID_SIZE` values along the longer side.
 
     east, north: ranges of the map, m.
     """
@@ -55,7 +55,7 @@ def sample_ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGri
 
 
 def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> bytes:
-    """Draw terrain as a WebP picture, north up.
+    """Draw terrain and its contours, north up; return the picture as WebP.
 
     east, north: ranges of the map, m.
     dark: True for dark colours.
@@ -92,8 +92,9 @@ def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> b
 
 
 def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
-    """Return terrain altitudes (rows, columns), m AMSL, with the southern row first.
+    """Return terrain altitudes on a grid (rows, columns), m AMSL, with the southern row first; NaN if unknown.
 
+    east, north: ranges of the map, m.
     pixels: number of values along the longer side.
     """
     width, height = east[1] - east[0], north[1] - north[0]

@@ -34,9 +34,7 @@ HEADERS = (
 
 
 def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
-    """Return the HTTP status and text with which a request is refused.
-
-    Returns (0, "") if the request is accepted.
+    """Return the HTTP status and the text with which to refuse a request; (0, "") to accept it.
 
     scope: description of the request by ASGI: type, method, path and headers.
     port: port of the studio.
@@ -72,7 +70,7 @@ def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
 
 
 class Guard:
-    """ASGI application that refuses requests, or forwards them to another application and adds `HEADERS`."""
+    """ASGI application that refuses a request, or forwards it to another application; all answers get `HEADERS`."""
 
     def __init__(self, app: App, port: int) -> None:
         """Guard an application that listens on `port`."""

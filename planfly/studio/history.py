@@ -1,4 +1,7 @@
-"""Record the edits of a mission, for undo and redo."""
+"""Record the edits of a mission, for undo and redo.
+
+A step is an edit with the mission that it made.
+"""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -30,12 +33,12 @@ class Step(NamedTuple):
 
 @dataclass(slots=True)
 class History:
-    """Missions, each made from the previous mission by an edit.
+    """Edits of a mission, with the mission that each of them made.
 
     first: the mission as opened.
     saved: the mission in the file; the mission as opened or downloaded last if there is no file.
-    steps: the edits.
-    position: number of steps that are in effect.
+    steps: the edits, including undone edits at the end.
+    position: number of steps that are in effect; the later steps are undone.
 
     >>> history = History(Mission(None, ()))
     >>> history.add(Mission(None, (), source="moved"), "move item 3")
@@ -58,16 +61,21 @@ class History:
 
     @property
     def undo_text(self) -> str:
-        """Text of the next undo; "" if there is nothing to undo."""
+        """Description of the edit that the next undo undoes; "" if there is nothing to undo."""
         return self.steps[self.position - 1].text if self.position else ""
 
     @property
     def redo_text(self) -> str:
-        """Text of the next redo; "" if there is nothing to redo."""
+        """Description of the edit that the next redo restores; "" if there is nothing to redo."""
         return self.steps[self.position].text if self.position < len(self.steps) else ""
 
     def add(self, mission: Mission, text: str, parameters: tuple[ParameterChange, ...] = ()) -> None:
-        """Record an edit, and discard undone edits; if there are too many steps, discard the oldest."""
+        """Record an edit, and discard undone edits; keep at most the newest `MAX_STEPS` edits.
+
+        mission: the mission that the edit made.
+        text: description of the edit.
+        parameters: autopilot parameters that the edit changed.
+        """
         self.steps = [*self.steps[: self.position], Step(mission, text, parameters)][-MAX_STEPS:]
         self.position = len(self.steps)
 

@@ -1,5 +1,7 @@
 """Judge the geometry of the legs and corners near a moved item, with the same result as for the whole route.
 
+A window is a judged part of the route.
+
 The judged part of the route covers all legs and corners that a move can change, and the threats and zones entered
 there. Requirements on the whole flight, such as energy, stall and bounds, are judged only with the whole route.
 """
@@ -34,9 +36,9 @@ _APPENDED_LEG_LENGTH_M = 3_000.0
 class Window:
     """A judged part of a route, near a moved item.
 
-    first, last: first and last waypoint of the judged legs and corners.
-    start: waypoint of the whole route at which the judged part starts.
-    requirements, findings: results for the part; their numbers of legs and corners count from ``start``.
+    first, last: first and last waypoint of the legs and corners with a result, as numbers in the whole route.
+    start: number of the waypoint at which the part starts; it starts before `first`.
+    requirements, findings: results for the part; their leg and corner numbers are relative to ``start``.
     """
 
     first: int
@@ -49,15 +51,13 @@ class Window:
 def judge_windows(
     context: EditContext, mission: Mission, index: int, previous_setup: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge the parts of a mission's route near a moved item.
-
-    Returns the route and the judged parts (windows).
+    """Judge the parts of a mission's route near a moved item; return the whole route and the judged parts (windows).
 
     The whole route is judged as one part if the move may change all of it, if it may contain surveys, or if the parts
     together would be as long as the route.
 
-    index: index of the item in the mission's list.
-    previous_setup: setup before the move, if known.
+    index: index of the moved item in the mission's list.
+    previous_setup: setup before the move, from whose route the new route is updated; None if unknown.
     Raises MissionError for a mission without a valid route.
     """
     route = None
@@ -106,8 +106,8 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
 
     Returns the extended part, and the number of waypoints added before the part.
 
-    The duration of a change of slope is computed from the highest airspeeds and the strongest wind of a whole route.
-    Therefore legs with these values are added, in a straight line, at the end of the part that is inside the route.
+    The judged duration of a change of slope depends on the highest airspeeds and the strongest wind of the whole route.
+    Legs with these values are therefore added in a straight line at the part's end that is inside the route.
 
     before_part: True to add the legs before the part, because the part ends at the end of the route.
     """
@@ -146,9 +146,10 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
 
 
 def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Window:
-    """Judge the legs and corners between the waypoints `first` and `last` of a route.
+    """Judge the legs and corners between two waypoints of a route.
 
     setup: setup of a part of the route that contains these waypoints.
+    first, last: numbers of the two waypoints in the whole route.
     start: number of the part's first waypoint in the whole route.
     """
     requirements = replace(route_requirements(setup), zone_check_legs=(first - start, last - start - 1))
@@ -168,11 +169,11 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
-    """Return a span extended on both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
+    """Return first and last waypoint of a span extended to both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
 
-    A loiter is included completely or not at all.
+    The extension ends at the ends of the route.  A loiter is included completely or not at all.
 
-    first, last: first and last waypoint of the span.
+    first, last: first and last waypoint of the span before the extension.
     """
     distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.positions))])
     start = min(

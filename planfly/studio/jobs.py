@@ -29,7 +29,7 @@ LONG_WORKER = "long"
 
 @dataclass
 class _ActiveTask:
-    """A task that a worker process is doing.
+    """Newest task of a worker process, until it has ended.
 
     number: number of the task, unique in a session.
     name: kind of the task: "fly", "plan", a key of `_TRIAL_LEVELS`, or a long task.
@@ -48,9 +48,9 @@ class _ActiveTask:
 
     @property
     def message(self) -> Json:
-        """Progress message to the pages.
+        """Message to the pages about the progress of the task.
 
-        Its number distinguishes the task from earlier tasks of the same name.
+        The number distinguishes the task from earlier tasks of the same name.
         """
         return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.fraction}
 
@@ -77,7 +77,7 @@ class Jobs:
     _is_first_path_pending: bool = False
 
     def start_first_task(self, session: Session) -> None:
-        """Start a flight of the opened mission, or a search for a path if a scenario was opened."""
+        """Start a flight of the opened mission, or a search for a path if a scenario was opened and not edited."""
         if session.document.to_plan and not session.is_edited:
             self._is_first_path_pending = True
             self._submit_task(
@@ -129,9 +129,10 @@ class Jobs:
     # Requests.
 
     def fly(self, session: Session) -> None:
-        """Fly the current mission and cancel a flight in progress; do nothing while a first path is planned.
+        """Start a flight of the current mission, which replaces a flight in progress.
 
-        Before the flight, suggestions of its geometric verdict are tried.
+        If the geometric verdict has suggestions that were not tried, they are tried first, and the flight follows.
+        Nothing is started while the first path of a scenario is planned.
         """
         if self.is_planning_first_path(session):
             return
@@ -145,7 +146,10 @@ class Jobs:
         self._submit_task(FLIGHT_WORKER, name, f"planfly.studio.worker_tasks.{function}", payload, session.rev)
 
     def plan(self, message: messages.Plan, session: Session) -> None:
-        """Plan one or several paths. Raises PlanflyError for items between which no path can be planned."""
+        """Start a search for one or several paths, as a page requests.
+
+        Raises PlanflyError for an unknown algorithm, and for items between which no path can be planned.
+        """
         request = self._plan_request(message, session)
         self._is_first_path_pending = False
         self._submit_task(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)
@@ -175,7 +179,7 @@ class Jobs:
                 worker.cancel()
 
     def _plan_request(self, message: messages.Plan, session: Session) -> PlanRequest:
-        """Make the request for a search.
+        """Return the request for a search for paths, as a page requests it.
 
         Raises PlanflyError for an unknown algorithm, and for items between which no path can be planned.
         """
@@ -203,8 +207,10 @@ class Jobs:
     def _submit_task(self, worker: str, name: str, function: str, payload: Any, rev: int) -> None:
         """Send a task to a worker; a task in progress there is cancelled.
 
+        worker: `FLIGHT_WORKER` or `LONG_WORKER`.
+        name: kind of the task, as in `_ActiveTask`.
         function: full name of the function that the worker calls with `payload`.
-        rev: revision of the mission.
+        rev: revision of the mission for which the task is done.
         """
         self._number += 1
         previous_task = self._active.get(worker)
@@ -214,7 +220,7 @@ class Jobs:
         self._worker(worker).submit(Task(self._number, function, payload))
 
     def _worker(self, name: str) -> WorkerProcess:
-        """Return a worker by its name, made when it is first used."""
+        """Return the worker with a name; create it at the first call."""
         if name not in self._workers:
             self._workers[name] = WorkerProcess(
                 f"planfly studio: {name}", lambda answer: self.on_answer(name, answer), pack=self.pack
@@ -225,10 +231,10 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages to send to the pages after an answer of a worker.
+        """Handle a worker's answer: store a result, start a follow-up task, and return the messages for the pages.
 
-        If another task has replaced the task, this is only the message that the task has stopped.  Progress gives at
-        most one message in `_REPORT_INTERVAL_S`.
+        For a task that another task has replaced, this is only the message that the task has stopped.  Progress gives
+        at most one message in `_REPORT_INTERVAL_S`.
         """
         task = self._active.get(worker)
         if task is None or task.number != answer.number:
@@ -256,7 +262,7 @@ class Jobs:
         return [result, *(following.message for following in [self._active.get(worker)] if following is not None)]
 
     def _stopped_message(self, name: str) -> Json:
-        """Return the message that a task has ended without a result.
+        """Return the message that a task has ended without a result; the end of a search also ends the first search.
 
         name: kind of the task, as in `_ActiveTask`.
         """
@@ -267,8 +273,8 @@ class Jobs:
     def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
         """Store the result of a task, and return the message that shows the result on the pages.
 
-        If a flight of the current mission failed, trials of its suggestions are started.  After trials by geometry, the
-        flight is started.
+        If a flight of the current mission failed, trials of its suggestions are started.  After trials of geometric
+        suggestions, the flight is started.
         """
         if task.name == "fly":
             previous_results, self._last_results = self._last_results, value.pop("figures")
@@ -304,8 +310,8 @@ class Jobs:
         self._other_messages = [*(message for message in self._other_messages if message["kind"] != task.name), message]
         return message
 
-    def has_new_initial_plan(self, session: Session) -> bool:
-        """Return True only at the first call after the path of the opened scenario has arrived."""
+    def take_initial_plan(self, session: Session) -> bool:
+        """Return True, once, when the first path of the opened scenario has arrived and can become the mission."""
         has_path = self._is_first_path_pending and bool(session.plans[0])
         if has_path:
             self._is_first_path_pending = False
@@ -315,7 +321,7 @@ class Jobs:
 def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
     """Return page data of the planned paths to choose from.
 
-    Each path names the quantities in which it is the best of them, such as "shortest".
+    Each path names the quantities, such as "shortest", in which it is the best of the paths.
     """
     quantities = {
         "shortest": [plan.length for plan in plans],

@@ -1,6 +1,6 @@
-"""Answer questions that take many flights, in the studio's second worker process.
+"""Do the long tasks of the studio in its second worker process.
 
-Can it return home, how likely is it to succeed, does the battery last, when can it take off, whom does it fly over?
+The tasks are returns to launch, a campaign, the battery, the take-off window and the ground risk of a mission.
 """
 
 from collections import Counter
@@ -31,22 +31,23 @@ _MAX_LISTED_RANGES = 6
 FLIGHT_COUNT = 24
 # Number of flights for the ground risk, each with its returns and falls.
 _RISK_FLIGHTS = 12
-# Number of flights of each take-off in a forecast.
+# Number of flights for each take-off time in a forecast.
 _WINDOW_FLIGHTS = 10
-# Time between two take-offs.
+# Time between two take-off times.
 _WINDOW_STEP = timedelta(hours=1)
-# Time after the first take-off at which the last one is tried.
+# Time from the first to the last take-off time.
 _WINDOW_SPAN = timedelta(hours=12)
 # One worker process, because another core flies for the page.
 _WORKERS = Workers(count=1)
 
 
 def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission, and judge returns to launch from points along the flight.
+    """Fly a mission, and judge simulated returns to launch from points along the flight.
 
-    Returns state, headline and result lines as page data.  Raises MissionError without a home or terrain.
+    Return state, headline and result lines as page data.
 
     payload: editing context, and mission.
+    Raises MissionError without a home or terrain.
     """
     context, mission = payload
     setup = context.setup(mission)
@@ -115,7 +116,7 @@ def _campaign_base(context: EditContext, mission: Mission) -> CampaignBase:
 
 
 def run_battery_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the smallest battery for a mission and its returns, as page data.
+    """Find the smallest battery for a mission and its returns to launch, and return the answer as page data.
 
     payload: editing context, and mission.
     """
@@ -128,7 +129,7 @@ def run_battery_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
 
 
 def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the volumes and the ground risk class of a mission by SORA 2.5, as page data.
+    """Find the volumes and the ground risk class of a mission by SORA 2.5, and return the answer as page data.
 
     payload: editing context, and mission.
     """
@@ -141,7 +142,7 @@ def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance)
 
 
 def run_window_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the take-off times at which a mission is flyable in its scenario's forecast, as page data.
+    """Find the take-off times at which a mission is flyable in its forecast, and return the answer as page data.
 
     payload: editing context, and mission.
 
@@ -164,7 +165,10 @@ def run_window_task(payload: tuple[EditContext, Mission], advance: Advance) -> d
 
 
 def _answer(is_good: bool | None, headline: str, lines: Iterable[str]) -> dict[str, Any]:
-    """Return an answer as page data.  is_good: None if it is not known."""
+    """Return an answer as page data.
+
+    is_good: True for a good answer, False for a bad one; None if it is not known.
+    """
     return {
         "state": "open" if is_good is None else "ok" if is_good else "fail",
         "headline": headline,

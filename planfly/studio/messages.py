@@ -35,7 +35,7 @@ LIMITS: tuple[str, ...] = get_args(LimitName)
 
 
 class Hello(_Message):
-    """First message: the token of the address, and whether the page is dark."""
+    """First message of a page: the token from its address, and true for a page with dark colours."""
 
     kind: Literal["hello"]
     token: Annotated[str, Field(min_length=1, max_length=100)]
@@ -43,7 +43,7 @@ class Hello(_Message):
 
 
 class Look(_Message):
-    """Change between light and dark page; the page needs a new picture of the terrain."""
+    """Change between light and dark colours, for which the page needs a new picture of the terrain."""
 
     kind: Literal["look"]
     dark: bool
@@ -69,7 +69,10 @@ class Drag(_Message):
 
 
 class Move(_Message):
-    """Move of an item: across the map, or to an altitude AMSL, or both."""
+    """Move of an item to a position on the map, to an altitude AMSL, or both.
+
+    k: index of the item.
+    """
 
     kind: Literal["move"]
     rev: _Rev
@@ -80,7 +83,12 @@ class Move(_Message):
 
 
 class Insert(_Message):
-    """Insertion of a waypoint after an item, at the mean altitude of this item and the next."""
+    """Insertion of a waypoint after an item, at the mean altitude of this item and the next.
+
+    The altitude is that of this item if the altitude frames of the two items differ.
+
+    after: index of the item.
+    """
 
     kind: Literal["insert"]
     rev: _Rev
@@ -90,7 +98,10 @@ class Insert(_Message):
 
 
 class Delete(_Message):
-    """Deletion of items."""
+    """Deletion of items.
+
+    ks: indices of the items.
+    """
 
     kind: Literal["delete"]
     rev: _Rev
@@ -98,7 +109,11 @@ class Delete(_Message):
 
 
 class Raise(_Message):
-    """Change of the altitude of items by ``by`` metres.  ks: indices of the items; null for all items."""
+    """Change of the altitude of items.
+
+    by: change, m, positive upwards.
+    ks: indices of the items; null for all items.
+    """
 
     kind: Literal["raise"]
     rev: _Rev
@@ -113,7 +128,12 @@ class Step(_Message):
 
 
 class Apply(_Message):
-    """Application of a finding's suggestion.  flown: true for a finding of the flight."""
+    """Application of a finding's suggestion.
+
+    finding: number of the finding in the verdict.
+    which: number of the suggestion in the finding.
+    flown: true for a finding of the flight, false for a finding of the geometric verdict.
+    """
 
     kind: Literal["apply"]
     rev: _Rev
@@ -127,8 +147,10 @@ class Settings(_Message):
 
     Values are checked like the values of a scenario.
 
-    limits: entries of [limits]; null removes an entry.  ceiling: m AMSL.
-    parameter: one autopilot parameter, as NAME=VALUE.  without: names of the parameters to reset.
+    limits: entries of [limits]; null removes an entry.
+    ceiling: m AMSL.
+    parameter: one autopilot parameter, as NAME=VALUE.
+    without: names of the parameters to reset.
     parameter_file: name of a parameter file, whose text is parameter_text.
     """
 
@@ -150,6 +172,7 @@ class Settings(_Message):
 class Plan(_Message):
     """Request for a path: between the ends of the scenario, or between two items.
 
+    first, last: indices of the two items.
     ways: number of paths to choose from, found in one search by the default algorithm.
     """
 
@@ -165,6 +188,7 @@ class Choose(_Message):
     """Choice of one of the planned paths.
 
     rev: revision of the mission for which they were planned.
+    which: number of the path in the message "ways".
     """
 
     kind: Literal["choose"]
@@ -173,7 +197,7 @@ class Choose(_Message):
 
 
 class Ask(_Message):
-    """Request to fly, to do a long task, or to stop the work in progress."""
+    """Request to fly, to start a long task, or to stop all tasks in progress."""
 
     kind: Literal["fly", "returns", "campaign", "battery", "ground_risk", "window", "stop"]
 
@@ -187,7 +211,11 @@ class Save(_Message):
 
 
 class Open(_Message):
-    """Request to open a file: dropped on the page, bytes in base 64; or in the server's folder, by path."""
+    """Request to open a file.
+
+    name: name of a file that was dropped on the page, or path of a file in the server's folder.
+    data: content of the dropped file in base 64; null for a file in the folder.
+    """
 
     kind: Literal["open"]
     name: Annotated[str, Field(min_length=1, max_length=1_000)]
@@ -203,8 +231,8 @@ _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 def read_message(text: str | bytes) -> Message:
     """Parse a message from a page.
 
-    Raises ValueError for a message that is too long, and ValidationError, a ValueError, for an invalid message.  A
-    message that opens a file may have any length.
+    Raises ValueError for a message longer than `MAX_MESSAGE_CHARACTERS`, and ValidationError, a ValueError, for an
+    invalid message.  A message that opens a file may be longer.
 
     >>> read_message('{"kind": "undo"}').kind
     'undo'

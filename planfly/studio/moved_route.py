@@ -35,9 +35,10 @@ def update_moved_route(
 
     The whole route must be computed again if a move may change more than the waypoint itself.  This is so next to
     loiters, merged waypoints and waypoints without an altitude, and for routes with jumps, gates, RTL, landings, or
-    courses at the ends.
+    courses at the ends.  It is also so if more than `_MAX_MOVED_ITEMS` items changed.
 
-    route: route of the previous mission.
+    route: route of `previous_mission`, the mission before the moves.
+    mission: the mission after the moves.
     """
     if len(previous_mission.items) != len(mission.items):
         return None
@@ -89,10 +90,7 @@ def update_moved_route(
 
 
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
-    """Return True if each position item is one stop of the route.
-
-    The altitude of a stop must not depend on other items, either.
-    """
+    """Return True if each item with a position is exactly one stop of the route, with its own altitude."""
     if any(value is not None for value in (route.rtl_start, route.direct_landing_start, route.landing_ground)):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:

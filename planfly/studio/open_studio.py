@@ -117,10 +117,9 @@ def _autosave_stem(target: str) -> str:
 
 @contextlib.contextmanager
 def _open_page(address: str) -> Iterator[None]:
-    """Open an address in the browser through a temporary file.
+    """Open an address in the browser through a temporary file, which exists until the ``with`` block ends.
 
-    If the address were an argument, the list of processes would show its token.  The file exists until the ``with``
-    block ends.
+    If the address were an argument of the browser, the list of processes would show its token.
     """
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"

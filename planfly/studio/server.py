@@ -65,8 +65,9 @@ NOT_UNDERSTOOD = 1007
 
 @dataclass(eq=False)
 class Page:
-    """Page that has sent its token.
+    """Connected page that has sent its token.
 
+    socket: websocket of the page.
     dark: True if the page has dark colours.
     frames: queue of frames to send.
     drag: newest position of a drag that is not judged yet, or None.
@@ -84,7 +85,7 @@ class Page:
     has_overflowed: asyncio.Event = field(default_factory=asyncio.Event)
 
     def send(self, message: Json | bytes) -> None:
-        """Queue a message for the page; a page whose queue is full is closed."""
+        """Queue a message for the page; if its queue is full, set `has_overflowed`, which closes the page."""
         frame = message if isinstance(message, bytes) else json.dumps(message, separators=(",", ":"), allow_nan=False)
         try:
             self.frames.put_nowait(frame)
@@ -94,10 +95,7 @@ class Page:
 
 
 class Server:
-    """Server of the studio, which connects pages, session and worker processes.
-
-    The sockets are left to uvicorn.
-    """
+    """Server of the studio, which connects pages, session and worker processes; uvicorn serves the sockets."""
 
     def __init__(self, session: Session, token: str, autosave_file: Path | None, folder: Path | None) -> None:
         """Prepare the server.
@@ -123,7 +121,7 @@ class Server:
     # Start and end.
 
     async def run(self) -> None:
-        """Start the first task, and autosave until the server ends."""
+        """Start the first task, then autosave every `AUTOSAVE_INTERVAL_S` until cancelled."""
         self._loop = asyncio.get_running_loop()
         self.jobs.start_first_task(self.session)
         while True:
@@ -131,7 +129,7 @@ class Server:
             await self._autosave_session()
 
     async def _autosave_session(self) -> None:
-        """Autosave the session if it has changed; report an error to the pages once."""
+        """Autosave the session if it has changed; report an error to the pages, but not again until a success."""
         if self._autosave_file is not None and (self.session.needs_autosave or self.session.autosaved_rev):
             # On a full disk the studio goes on without autosave, and reports the error once.
             try:
@@ -155,7 +153,7 @@ class Server:
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_task(self, task: Task | None) -> bytes:
-        """Pickle a task in the judging thread, because judging fills caches of the pickled objects."""
+        """Pickle a task in the judging thread, where judging cannot change caches of the pickled objects meanwhile."""
         return self._judge_thread.submit(pickle.dumps, task).result()
 
     # ------------------------------------------------------------------
@@ -204,7 +202,7 @@ class Server:
     async def _authenticate(self, socket: WebSocket) -> Page | None:
         """Return the page if its first message has the token; otherwise close the websocket and return None.
 
-        The websocket is also closed if `MAX_PAGES` pages stay connected.
+        The websocket is also closed if `MAX_PAGES` other pages stay connected for `TOKEN_TIMEOUT_S`.
         """
         code = NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
@@ -239,7 +237,7 @@ class Server:
                 await (page.socket.send_bytes(frame) if isinstance(frame, bytes) else page.socket.send_text(frame))
 
     async def _judge_drags(self, page: Page) -> None:
-        """Judge the newest position of a drag and send the result, one position at a time."""
+        """Judge the newest position of a page's drag and send the result, one position at a time, until cancelled."""
         while True:
             await page.drag_received.wait()
             page.drag_received.clear()
@@ -294,10 +292,10 @@ class Server:
     # Messages of a page.
 
     async def _handle_message(self, page: Page, text: str) -> None:
-        """Handle a message.
+        """Handle a message of a page.
 
-        An error that the user can mend is sent to the page. An edit of a mission that has changed since is not made;
-        the page is sent the current mission. Raises ValueError for a message that is not understood.
+        Errors are sent to the page as a fault. An edit of an older revision is not made; the page is sent the current
+        mission instead. Raises ValueError for a message that is not understood.
         """
         try:
             message = read_message(text)
@@ -351,7 +349,7 @@ class Server:
             page.send({"kind": "fault", "text": internal_text(error)})
 
     async def _change_session(self, message: messages.Message) -> None:
-        """Change the session as a message requests, send the result to every page, and start a flight.
+        """Change the session as a message requests, send the changed mission to every page, and start its flight.
 
         If the message changes nothing, nothing is sent or started.
         """
@@ -418,26 +416,26 @@ class Server:
     # Answers of the processes.
 
     def _forward_answer(self, worker: str, answer: Answer) -> None:
-        """Forward an answer of a worker from its thread to the event loop."""
+        """Forward an answer from the worker's thread to the event loop; drop it if the loop has ended."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._send_messages_of_answer, worker, answer)
 
     def _send_messages_of_answer(self, worker: str, answer: Answer) -> None:
-        """Handle a worker's answer: send the resulting messages to the pages.
+        """Handle a worker's answer, and send the resulting messages to the pages.
 
-        If the answer is the first planned path, the path becomes the mission.
+        If the answer is the first planned path, its change to the mission is scheduled.
         """
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)
-        if self.jobs.has_new_initial_plan(self.session):
+        if self.jobs.take_initial_plan(self.session):
             choice = messages.Choose(kind="choose", rev=self.session.rev, which=0)
             self._initial_plan_task = asyncio.ensure_future(self._apply_initial_plan(choice))
 
     async def _apply_initial_plan(self, message: messages.Choose) -> None:
-        """Use the path that was planned at the start of the studio.
+        """Make the path that was planned at the start of the studio the mission.
 
-        If the mission was edited in the meantime, this is reported instead.
+        If the mission was edited in the meantime, or the path cannot be used, a fault is sent to the pages instead.
         """
         try:
             await self._change_session(message)
@@ -461,9 +459,9 @@ class Server:
 
 
 async def _receive_text(socket: WebSocket) -> str:
-    """Return the next text message.
+    """Return the next text message of a websocket.
 
-    Raises ValueError for a binary message, and WebSocketDisconnect at the end.
+    Raises ValueError for a binary message, and WebSocketDisconnect when the page has disconnected.
     """
     event = await socket.receive()
     if event["type"] == "websocket.disconnect":

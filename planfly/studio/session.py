@@ -66,7 +66,7 @@ class TriedChanges(NamedTuple):
 
     rev: revision of the judged mission.
     findings: findings with these suggestions, as page data.
-    changes: changed mission and suggestion of each trial, keyed by the numbers of finding and suggestion.
+    changes: mission with the suggestion applied, and the suggestion, by (number of finding, number of suggestion).
     """
 
     rev: int
@@ -126,7 +126,10 @@ class Session:
 
     @classmethod
     def from_document(cls, document: Document, options: MissionOptions) -> "Session":
-        """Start a session with an opened document.  options: options of the command."""
+        """Return a new session with an opened document.
+
+        options: options of the command.
+        """
         context = EditContext.from_setup(
             document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ())
         )
@@ -140,7 +143,8 @@ class Session:
 
         A mission file is judged with the settings of the session.  A plan or a log has its own settings.
 
-        first_autosave_file: autosave path of the first document; None to restore no earlier edits of the document.
+        first_autosave_file: autosave path of the session's first document, from which the document's own path follows;
+            None to restore no autosaved edits.
         """
         is_named_file = document.path is not None and document.path.resolve() == self.named_file
         new_session = Session.from_document(document if is_named_file else replace(document, path=None), self.options)
@@ -178,18 +182,23 @@ class Session:
         self.document_rev += 1
 
     def _add_to_history(self, mission: Mission, text: str, parameters: tuple[ParameterChange, ...] = ()) -> None:
-        """Record an edit, and discard documents whose opening was undone. text: description of the edit."""
+        """Record an edit, and discard documents whose opening was undone.
+
+        mission: the mission that the edit made.
+        text: description of the edit.
+        parameters: autopilot parameters that the edit changed.
+        """
         self.history.add(mission, text, parameters)
         self.undone_states = []
 
     @property
     def undo_text(self) -> str:
-        """Text of the next undo, which may be "open" and a document; "" if there is nothing to undo."""
+        """Description of the edit or of the opening that the next undo undoes; "" if there is nothing to undo."""
         return self.history.undo_text or (f"open {self.document.name}" if self.earlier_states else "")
 
     @property
     def redo_text(self) -> str:
-        """Text of the next redo; "" if there is nothing to redo."""
+        """Description of the edit or of the opening that the next redo restores; "" if there is nothing to redo."""
         return self.history.redo_text or (f"open {self.undone_states[-1][0].name}" if self.undone_states else "")
 
     @property
@@ -204,7 +213,7 @@ class Session:
 
     @property
     def is_edited(self) -> bool:
-        """True if the mission was edited, even if all edits were undone."""
+        """True if the mission was ever edited, even if all edits were undone."""
         return self.is_changed or bool(self.history.steps)
 
     @property
@@ -289,9 +298,9 @@ class Session:
         self._add_to_history(mission, text, tuple(parameter_changes))
 
     def _context_with_parameters(self, values: Mapping[str, float | None]) -> EditContext:
-        """Return the editing context with other values of the parameters that the autopilot has, by name.
+        """Return the editing context with other parameter values; names that the autopilot does not have are ignored.
 
-        values: None resets a parameter that was set in the studio.
+        values: value by name; None resets a parameter that was set in the studio.
         """
         parameters = self.context.uav.autopilot.parameters
         known_names = () if parameters is None else {parameter.name for parameter in parameters.values}
@@ -392,8 +401,8 @@ class Session:
     def _set_mission(self, mission: Mission, context: EditContext | None = None) -> None:
         """Judge a mission, make it the current mission, and discard planned paths.
 
-        The revision number is increased, and that of the world if the editing context changes.  An invalid mission
-        raises PlanflyError, and changes nothing.
+        The revision is increased, and the revision of the world, too, if the editing context changes.  An invalid
+        mission raises PlanflyError, and changes nothing.
 
         context: the editing context to judge the mission with; None for the current context.
         """
@@ -406,9 +415,11 @@ class Session:
         self.rev += 1
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
-        """Return the mission with an item moved to a position, m, or altitude, m AMSL.
+        """Return the mission with an item moved on the map, to another altitude, or both.
 
-        A coordinate of None is not changed.
+        index: index of the item.
+        east, north: new map position, m; the item stays there if one of them is None.
+        altitude: new altitude, m AMSL; None keeps the altitude.
         """
         mission = self.mission
         edits.movable_item(mission, index)
@@ -424,7 +435,10 @@ class Session:
         return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
 
     def item_position(self, index: int) -> tuple[float, float, float]:
-        """Return east, north and altitude AMSL of an item, m. Raises MissionError if the item has no position."""
+        """Return east, north and altitude AMSL of the item with an index, m.
+
+        Raises MissionError if the item has no position.
+        """
         edits.movable_item(self.mission, index)
         east, north, altitude = self.context.item_positions(self.mission)[
             edits.movable_indices(self.mission).index(index)
@@ -435,7 +449,7 @@ class Session:
     # The world.
 
     def change_settings(self, settings: Settings) -> None:
-        """Change the settings of the flight.
+        """Change the settings, and judge the mission with them.
 
         Raises PlanflyError, which names settings by their labels on the page, for a value that is not allowed.
         """
@@ -460,9 +474,9 @@ class Session:
     # Page data, and files.
 
     def mission_message(self) -> Json:
-        """Return the message with the current mission and its verdict, as the page shows them.
+        """Return the message to the pages with the current mission and its geometric verdict.
 
-        It also has the texts of undo and redo and the notes, and the suggestions that passed a trial, if any.
+        It also has the texts of undo and redo, the notes, and the suggestions that passed their trials, if any.
         """
         tried = self.tried.get("geometric")
         return {
@@ -493,7 +507,7 @@ class Session:
         return f"autosaved settings {outcome_text}: {'; '.join(self.replaced_settings)}"
 
     def world_message(self) -> Json:
-        """Return the message with the map, threats, zones and settings."""
+        """Return the message to the pages with the map, threats, zones and settings."""
         return {
             "kind": "world",
             "world": self.world_rev,
@@ -502,10 +516,13 @@ class Session:
         }
 
     def save(self, form: str) -> SavedFile:
-        """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
+        """Return the mission as a file to download.
 
-        If there is no file to overwrite, the mission then counts as saved, unless the file is only a map or a parameter
-        file.
+        If there is no file to overwrite, the mission is then considered saved, unless the download is only a map or a
+        parameter file.
+
+        form: format, a key of `SAVED_SUFFIXES`.
+        Raises PlanflyError if the format cannot store the mission.
         """
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form in KINDS and form != "kml" and not self.file_kind:
@@ -513,9 +530,10 @@ class Session:
         return saved_file
 
     def overwrite_file(self) -> SavedFile:
-        """Overwrite the mission file that the studio was started with.
+        """Overwrite the mission file that the studio was started with; return the new file.
 
-        Raises PlanflyError if the studio was started without one, or if another program has changed it.
+        Raises PlanflyError if the studio was started without a mission file, if another program has changed it, or if
+        its format cannot store the mission.
         """
         path = self.document.path
         if path is None or not self.file_kind:
@@ -536,7 +554,7 @@ class Session:
 
     @property
     def needs_autosave(self) -> bool:
-        """True if the mission or the settings differ from the opened document, or from the autosave."""
+        """True if the session has edits, other settings than the opened document, or an autosave to be replaced."""
         has_notes = self.must_autosave or bool(self.unused_text)
         return self.is_edited or has_notes or self.context.scenario is not self.document.setup.scenario
 
@@ -549,7 +567,7 @@ class Session:
         return file if is_first else sibling_autosave_path(file, self.history.first)
 
     def autosave(self, first_autosave_file: Path) -> None:
-        """Write the autosave file if anything has changed since the last autosave.
+        """Write the autosave file of the current document if anything has changed since the last autosave.
 
         first_autosave_file: autosave path of the first document.  A file that could not be read is not overwritten.
         """
@@ -566,10 +584,11 @@ class Session:
         self.autosaved_rev = self.rev
 
     def restore(self, file: Path, settings: Json | None = None) -> bool:
-        """Restore the autosave of this document, with its edits; return True if there was one.
+        """Restore the autosaved edits and settings of this document; return True if they changed anything.
 
-        If the mission file has changed since, only the settings are restored, and an autosave with unsaved edits is set
-        aside. An autosave that cannot be read is added to `unreadable`, and is neither restored nor overwritten.
+        If the mission file has changed since the autosave, only the settings are restored, and an autosave with unsaved
+        edits is set aside. An autosave that cannot be read is added to `unreadable`, and is neither restored nor
+        overwritten.
 
         settings: current settings, which replace the autosaved ones and the command's options; None for a new session.
         """
@@ -613,8 +632,11 @@ class Session:
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
-    """Open the target of the command; return the session, and True if an autosave was restored.
+    """Open the target of the command; return the session, and True if an autosave changed it.
 
+    target: name of a scenario, or path of a file.
+    options: options of the command.
+    autosave_file: autosave path of the document; None to restore nothing.
     Raises PlanflyError if the target cannot be opened.
     """
     session = Session.from_document(open_document(target, options), options)

@@ -69,7 +69,7 @@ class ChangedParameters:
     values: values by name, in the units of the autopilot.
     file: name of the file that was read last, or "".
     unused: names in this file that the simulated autopilot does not use.
-    typed: names of the values that were set one at a time.
+    typed: names of the values that were typed on the page, not read from the file.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -78,11 +78,14 @@ class ChangedParameters:
     typed: tuple[str, ...] = ()
 
     def text(self, title: str) -> str:
-        """Return the text of a parameter file for ground stations.  title: comment in its first line."""
+        """Return the text of a parameter file for ground stations.
+
+        title: comment in the first line.
+        """
         return parameters_text(self.values, title)
 
     def with_values(self, values: Mapping[str, float | None]) -> "ChangedParameters":
-        """Return the parameters with other values by name; a value of None removes a parameter."""
+        """Return the parameters after some values were set by name; a value of None removes a parameter."""
         merged = {name: value for name, value in (self.values | dict(values)).items() if value is not None}
         typed = tuple(name for name in dict.fromkeys((*self.typed, *values)) if name in merged)
         return ChangedParameters(merged, self.file if merged else "", self.unused if merged else (), typed)
@@ -111,9 +114,9 @@ def own_aircraft(scenario: Scenario) -> dict[str, str]:
 
 
 def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, str]]:
-    """Return the [flight] entries of a scenario that name its parameter file and autopilot.
+    """Return {name of the autopilot: [flight] entries} of a scenario with a parameter file; {} without such a file.
 
-    They are keyed by the name of the autopilot.  The result is empty without a parameter file.
+    The entries are those that name the parameter file, the autopilot and its version.
     """
     table = scenario.flight.model_dump(include={"autopilot", "params", "arduplane_version", "px4_version"})
     entries = {key: str(value) for key, value in table.items() if value is not None}
@@ -121,7 +124,7 @@ def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, st
 
 
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
-    """Rewrite an error about changed settings with the labels that the settings have on the page.
+    """Return an error about changed settings, rewritten with the labels that the settings have on the page.
 
     The scenario's name, which may be the name of the mission file, is omitted.
 
@@ -146,9 +149,10 @@ def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: 
 
 
 def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Mapping[str, str]) -> Scenario:
-    """Return a scenario with the requested settings. Raises PlanflyError for an invalid value.
+    """Return a scenario with the requested settings of aircraft, autopilot, weather and limits.
 
     folders: folders of the user's own aircraft, by name.
+    Raises PlanflyError for an invalid value.
     """
     wind = None
     if settings.wind_speed is not None or settings.wind_from is not None:
@@ -180,7 +184,7 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
 
 
 def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, settings: Settings) -> ChangedParameters:
-    """Return the changed parameters after a change of settings, for the autopilot of a scenario.
+    """Return the changed parameters after a change of settings, checked against the autopilot of a scenario.
 
     A change of the autopilot discards all parameters. A file replaces all parameters; a single parameter replaces only
     its own value.
@@ -209,7 +213,7 @@ def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, set
 def read_parameters(scenario: Scenario, text: str, name: str) -> ChangedParameters:
     """Parse the text of a parameter file for the autopilot of a scenario.
 
-    The scenario's own parameters are left out.
+    Values that only the scenario's parameter file sets are left out.
 
     name: file name for messages.
 
@@ -245,7 +249,10 @@ def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
 def settings_json(
     scenario: Scenario, uav: Uav, changed_parameters: ChangedParameters, folders: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return the current settings as page data.  folders: folders of the user's own aircraft, by name."""
+    """Return the current settings, and the values to choose from, as page data.
+
+    folders: folders of the user's own aircraft, by name.
+    """
     limits, parameters = scenario.to_json().get("limits", {}), uav.autopilot.parameters
     remainder_text = (
         f" and {len(changed_parameters.unused) - _MAX_LISTED_NAMES} more"
@@ -275,7 +282,7 @@ def settings_json(
 
 
 def changed_settings(opened: Mapping[str, Any], current: Mapping[str, Any]) -> list[str]:
-    """Return the names of the settings whose values differ, except the autopilot's parameters.
+    """Return the labels, in lower case, of the settings whose values differ, except the autopilot's parameters.
 
     opened, current: settings as page data (`settings_json`).
     """

@@ -55,7 +55,10 @@ _MIN_HEIGHT_RATIO = 0.9
 
 
 def round_to_json(values: Any, digits: int = 1) -> Any:
-    """Return an array as (nested) lists of rounded numbers; numbers that are not finite become None."""
+    """Return an array as (nested) lists of numbers rounded to a number of decimals (`digits`).
+
+    NaN and infinity become None.
+    """
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
         return array.tolist()
@@ -145,7 +148,10 @@ def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
 
 
 def windows_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
-    """Return page data of the legs and corners that were judged near a moved item."""
+    """Return page data of the windows: the legs and corners that were judged near a moved item.
+
+    route: the whole route of the mission.
+    """
     windows_data = []
     for window in windows:
         first, last = window.first, window.last
@@ -186,10 +192,7 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def commands_json(mission: Mission) -> list[Json]:
-    """Return page data of items without a place on the map, such as speeds and jumps.
-
-    The page shows them, but cannot edit them.
-    """
+    """Return page data of the items without a position, such as changes of speed and jumps, which cannot be edited."""
     places = set(movable_indices(mission))
     return [
         {"k": k, "seq": item.seq, "text": _command_text(item)}
@@ -199,7 +202,7 @@ def commands_json(mission: Mission) -> list[Json]:
 
 
 def _command_text(item: MissionItem) -> str:
-    """Describe an item without a place on the map.
+    """Return a text on an item without a position: command and parameters.
 
     >>> _command_text(MissionItem(3, 178, 3, (0.0, 21.0, -1.0, 0.0), 0.0, 0.0, 0.0))
     'change speed: airspeed 21 m/s'
@@ -223,9 +226,9 @@ def _command_text(item: MissionItem) -> str:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Return page data of the waypoints `first` to `last`: their positions and the indices of their items.
+    """Return page data of the waypoints `first` to `last`: their positions, m, and the indices of their items.
 
-    The index is -1 for a waypoint without an item.
+    The index of an item is its position in the mission's list; -1 for a waypoint without an item.
     """
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
@@ -256,7 +259,7 @@ def states_json(states: PlaceStates, first: int, last: int) -> Json:
 
 
 def _state_data(state: State) -> list[str | float | None]:
-    """Return a state as page data: its name, its text, and its closeness, or None if no limit is near.
+    """Return a state as page data: name, text, and closeness; the closeness is None if no limit is near.
 
     The page uses the closeness to find the worst of several laps past the same item.
     """
@@ -282,11 +285,12 @@ def verdict_page_data(verdict: Verdict) -> Json:
 
 
 def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[Json]:
-    """Return page data of the findings to list, each as in ``verdict.json``, with its number, title and offers.
+    """Return page data of the findings to list, each as in ``verdict.json``, with number, title, state and offers.
 
-    These are the failed and undecided findings, then the finding closest to its limit for each rule.
+    The offers of a finding are its suggestions.  Listed are the failed and undecided findings, then the finding closest
+    to its limit for each rule.
 
-    tried: suggestions that passed their trials; failed findings show no others.
+    tried: suggestions that passed their trials; failed findings offer no others.
     """
     verdict = replace(verdict, findings=with_passing_suggestions(verdict.findings, tried))
     return [
@@ -315,10 +319,7 @@ def can_apply_in_studio(suggestion: Suggestion) -> bool:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return page data of the profile along the route.
-
-    The data include terrain, waypoints, and sections of threats and zones.
-    """
+    """Return page data of the profile along the route: terrain, waypoints, and cross-sections of threats and zones."""
     route = setup.route.positions
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))

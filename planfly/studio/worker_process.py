@@ -65,11 +65,10 @@ class Cancelled(Exception):
 
 
 class WorkerProcess:
-    """Interface of the server to a worker process.
+    """Handle with which the server submits tasks to a worker process.
 
-    Its methods may be called from any thread, and never block.
-
-    A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
+    Its methods may be called from any thread.  A thread of its own sends the newest task, so that a process that does
+    not read its pipe blocks no caller.
     """
 
     def __init__(
@@ -113,13 +112,14 @@ class WorkerProcess:
         self._set_newest_task(task)
 
     def cancel(self) -> None:
-        """Cancel the task in progress."""
+        """Cancel the task in progress, and a task that was not sent yet."""
         self._set_newest_task(None)
 
     def _set_newest_task(self, task: Task | None) -> None:
         """Replace the newest task, which cancels a task in progress; None only cancels.
 
-        If the cancelled task does not end in time, its process is killed.
+        If the cancelled task does not end in time, its process is killed.  A task that was not sent is answered as
+        cancelled.
         """
         with self._condition:
             dropped_task = self._newest_task if not self._is_newest_sent else None
@@ -191,7 +191,7 @@ class WorkerProcess:
     def _fail_unsent(self, task: Task | None, reason: str) -> None:
         """Answer a task that could not be sent to the process with a fault; do nothing if the worker is closed.
 
-        task: None only cancels, and has no answer.
+        task: the task; None, which only cancels, has no answer.
         reason: line for the user.
         """
         with self._condition:
@@ -223,10 +223,7 @@ class WorkerProcess:
             self._on_answer(Answer(dropped_number, "cancelled"))
 
     def _drop_unanswered(self) -> list[int]:
-        """Clear the unanswered tasks of a lost process.
-
-        Returns the numbers of these tasks, except the number of the newest task.
-        """
+        """Clear the list of the unanswered tasks of a lost process; return their numbers, except the newest task's."""
         dropped_numbers = [
             number for number in self._unanswered if self._newest_task is None or number != self._newest_task.number
         ]
@@ -240,7 +237,10 @@ class WorkerProcess:
         self._timer = None
 
     def _ensure_process(self) -> Connection:
-        """Return the pipe to the worker process; start the process if it is not running."""
+        """Return the pipe to the worker process; start the process if it is not running.
+
+        Raises OSError if the process cannot be started.
+        """
         if self._pipe is not None and self._process is not None and self._process.is_alive():
             return self._pipe
         context = multiprocessing.get_context("spawn")
@@ -300,9 +300,9 @@ class WorkerProcess:
 
 
 def run_worker(pipe: Connection) -> None:
-    """Run the newest task from the pipe until the pipe closes.
+    """Run tasks from a pipe, always the newest, until the pipe closes; the main loop of a worker process.
 
-    This is the main loop of a worker process.
+    Tasks that a newer task replaces before they start are answered as cancelled.
     """
     import signal
 

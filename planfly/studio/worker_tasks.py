@@ -45,8 +45,8 @@ _MAX_DRAWN_ROWS = 1_500
 def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission with its simulated autopilot, judge the flight, and return the results as page data.
 
-    The findings have no suggestions.  "judged" is the pickled flight for `try_flown_suggestions`, or empty if nothing
-    failed.
+    The findings have no suggestions.  "judged" is the pickled flight for `try_flown_suggestions`; it is empty if
+    nothing failed.
 
     payload: the editing context, and the mission.
     """
@@ -89,7 +89,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Try the suggestions of a mission's geometric verdict, without flights.
 
-    The result is that of `try_flown_suggestions`.
+    Return the same data as `try_flown_suggestions`.
 
     payload: the editing context, and the mission.
     """
@@ -98,10 +98,10 @@ def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advan
 
 
 def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a failed flight in trial flights, and return those that passed.
+    """Try the suggestions of a failed flight in trial flights, and return the suggestions that passed.
 
-    The result contains the findings with these suggestions as page data.  It also contains each changed mission with
-    its suggestion, keyed by the numbers of finding and suggestion, unless the studio cannot apply the suggestion.
+    "findings" are all findings with these suggestions, as page data.  "changes" are the mission with a suggestion
+    applied, and the suggestion, by (number of finding, number of suggestion), if the studio can apply the suggestion.
 
     payload: the editing context, and the pickled flight.
     """
@@ -110,7 +110,7 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
 
 
 def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a verdict; the result is that of `try_flown_suggestions`."""
+    """Try the suggestions of a verdict, and return the same data as `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
         """Report that suggestions are tried; return False, so that the trials are not aborted."""
@@ -142,8 +142,7 @@ class PlanRequest:
 
     ends: start and destination, (2, 3), m; None for the ends of the scenario.
     algorithm: name of the algorithm; None for the default.
-    ways: maximum number of paths; if there are several, no path is better than another in all of length, exposure,
-        clearance and energy.
+    ways: maximum number of paths; several paths are a Pareto front of length, exposure, clearance and energy.
     """
 
     scenario: Scenario
@@ -157,7 +156,8 @@ class PlanRequest:
 def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     """Plan one or several paths, and return them, the shortest first.
 
-    If no path is safe, the best path is returned.
+    If no path is safe, only the best path is returned.  A single path has NaN for the quantities of a comparison that
+    take long to compute.
     """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL

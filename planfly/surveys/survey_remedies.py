@@ -1,4 +1,4 @@
-"""Find remedies for surveys with photo lines that cannot be flown; each remedy is flown before it is suggested."""
+"""Find remedies for surveys with photo lines that cannot be used; each remedy is flown before it is suggested."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -49,9 +49,11 @@ _GROUND_SPEED_RATIO = 0.98
 class SurveyRemedy:
     """Change with which a survey was flown and passed.
 
-    kind: kind of the change.  name: name of the changed parameter; "" for other kinds.
-    current, value: distance between photos, added height or turn-around distance in m, interleave stride (fly every
-    n-th line), course in degrees, value of the parameter, or airspeed in m/s.
+    kind: kind of the change.
+    name: name of the changed parameter; "" for other kinds.
+    current, value: value before and after the change.  By kind, it is the distance between photos, added height or
+        turn-around distance, m, the interleave stride n (every n-th line is flown first), the course, degrees, the
+        value of the parameter, or the airspeed, m/s.
     unit: unit of `current` and `value`.
     verdict: verdict on the flight.
     mission: the mission as it was flown.
@@ -77,9 +79,9 @@ class SurveyRemedy:
 
 @dataclass(frozen=True, slots=True)
 class NearMiss:
-    """Change that was flown and did not pass, but came closest to passing.
+    """Trial flight that did not pass, but came closest to passing.
 
-    what: description of the change.
+    what: description of the flown change.
     usable, lines: usable photo lines and all photo lines.
     verdict: verdict on the flight.
     """
@@ -97,7 +99,7 @@ class NearMiss:
 
 @dataclass(frozen=True, slots=True)
 class TriedRemedies:
-    """Result of the trials.
+    """Result of the trial flights of a survey.
 
     remedies: changes with which all lines can be used.
     nearest: the best change that did not pass, if none passed; None if none was better than the mission itself.
@@ -122,8 +124,7 @@ def find_survey_remedies(
 
     If neither longer turn-around distances nor gates are enough, both are combined.  If nothing else is enough, gates
     are combined with a lower airspeed, and longer turn-around distances with another parameter value or a lower
-    airspeed.  There are at most four flights
-    for each of about six changes.
+    airspeed.  There are at most four flights for each of about six changes.
 
     verdict: verdict on the flight of the setup.
     on_trial: called before each flight with a description of the change.
@@ -157,7 +158,7 @@ def find_survey_remedies(
 
 
 def _worst_margins(verdict: Verdict) -> dict[str, float]:
-    """Return the minimum margin of each rule that fails; -inf if a failure has no margin."""
+    """Return the minimum margin of each failed rule of a verdict, by rule; -inf if a failure has no margin."""
     margins: dict[str, float] = {}
     for finding in verdict.findings:
         if finding.ok is False:
@@ -173,7 +174,7 @@ def _count_usable(verdict: Verdict) -> tuple[int, int]:
 
 
 def _usable_parts(verdict: Verdict) -> list[float]:
-    """Return the usable part of each photo line, %; 0 for a line that was not flown or not judged."""
+    """Return the usable part of each photo line according to a verdict, %; 0 for a line not flown or not judged."""
     return [0.0 if finding.flown is None else finding.flown for finding in _line_findings(verdict)]
 
 
@@ -183,9 +184,9 @@ def _line_findings(verdict: Verdict) -> list[Finding]:
 
 
 def _success_key(verdict: Verdict) -> tuple[int, float, int, float]:
-    """Return a sort key that is larger for a flight closer to success.
+    """Return a sort key of a flight's verdict, which is larger the closer the flight is to success.
 
-    Its parts are the number of usable lines, the mean usable part of the lines in whole %, the negative number of
+    Its entries are the number of usable lines, the mean usable part of the lines in whole %, the negative number of
     failed findings, and the sum of the margins of photo overlaps that fail, %.
     """
     parts = _usable_parts(verdict)
@@ -247,13 +248,13 @@ class _Trials:
     # One flight.
 
     def _changed_setup(self, mission: Mission, uav: Uav) -> FlightSetup:
-        """Return the setup of a changed mission; vertical legs are accepted, as in the original mission."""
+        """Return the setup of a changed mission with a UAV; vertical legs are accepted, as in the original mission."""
         scenario = self._setup.scenario
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, uav, mission, self._setup.seed, placed=placed)
 
     def _fly_trial(self, mission: Mission, uav: Uav, description: str) -> _TrialFlight | None:
-        """Fly a changed mission, and store the flight if it came closest to passing.
+        """Fly a changed mission, and store it as `nearest` if it came closer to passing than all flights before.
 
         description: description of the change.
         Returns verdict, mission and path length (m), or None for a mission without a valid route.
@@ -270,7 +271,7 @@ class _Trials:
         return trial.flight_verdict, mission, trial.setup.path.length
 
     def _fly_layout(self, layout: SurveyLayout, description: str) -> _TrialFlight | None:
-        """Fly the surveys with another layout; return None if the layout cannot be made.
+        """Fly the mission with another layout of its surveys; return None if the layout cannot be made.
 
         description: description of the layout.
         """
@@ -293,9 +294,9 @@ class _Trials:
         return self._fly_trial(mission, self._uav, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
-        """Return True if all lines are usable in a flight, and no other rule fails more than before.
+        """Return True if all lines are usable in a flight, and no other rule fails newly or clearly worse than before.
 
-        A failure may become larger by at most one noticeable difference (`scale`) of the rule.
+        A failure may become larger by at most the `scale` of its rule, the smallest noticeable difference.
         """
         return (
             flight is not None
@@ -357,10 +358,7 @@ class _Trials:
         return None
 
     def find_turn_around(self) -> SurveyRemedy | None:
-        """Find the shortest turn-around distance that passes, or None.
-
-        Only distances longer than the current distance are tried.
-        """
+        """Find the shortest turn-around distance above the current one that passes; return None if none passes."""
         return self._find_shortest_turn_around(1, self._longer_turn_arounds(), 0.0)
 
     def _longer_turn_arounds(self) -> list[float]:
@@ -496,7 +494,7 @@ class _Trials:
         )
 
     def find_airspeed(self, *, has_gates: bool = False) -> SurveyRemedy | None:
-        """Find the highest of the reduced airspeeds that passes, or None.
+        """Find the highest of the reduced airspeeds that passes; return None if none passes.
 
         has_gates: True for gates at the ends of the lines in addition.
 
@@ -528,7 +526,8 @@ class _Trials:
         """Find the shortest turn-around distance that passes in combination with another change.
 
         change: description of the other change.
-        uav, mission: changed uav, and changed mission or None.
+        uav: UAV with the change, or the unchanged UAV.
+        mission: mission with the change; None for the unchanged mission.
         turn_arounds: distances to try, in increasing order, m.
         has_gates: True for gates at the ends of the lines.
         airspeed: airspeed on the surveys, m/s; 0 if it is not changed.
@@ -571,10 +570,13 @@ class _Trials:
         return next((remedy for remedy in pairs if remedy is not None), None)
 
     def _find_turn_around_for_parameter(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
-        """Find the shortest turn-around distance that passes with the farthest value of a parameter.
+        """Find a turn-around distance and a parameter value that pass together.
 
-        After that, the search finds the passing value nearest to the current value, with this distance.  Return None if
-        no turn-around distance passes even with the farthest value.
+        The shortest distance that passes with the parameter's farthest value is found first, then the passing value
+        nearest to the current value with this distance.  Return None if no distance passes with the farthest value.
+
+        candidate: the parameter and its values to try.
+        current: current value of the parameter.
         """
         remedies = list[SurveyRemedy]()
         # Do not suggest values below the documented range.
@@ -679,9 +681,11 @@ class _Trials:
 
 
 def missing_height(measure: OverlapMeasure, tolerance: float = 0.0) -> float:
-    """Return the climb with which the lowest photos have the required overlaps, or less by a tolerance, m.
+    """Return by how much photo lines must be raised for the lowest photos to have the required overlaps, m.
 
     The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
+
+    tolerance: fraction by which the overlaps may be less than required.
     """
     camera, missing = measure.camera, 0.0
     for overlap, required, distance, width, height in (
@@ -742,8 +746,5 @@ def ordinal_text(number: int) -> str:
 
 
 def _commanded_airspeed(item: MissionItem) -> float:
-    """Return the airspeed that an item sets, m/s.
-
-    The result is 0 for other items, and NaN or negative if the item sets no airspeed.
-    """
+    """Return the airspeed that a DO_CHANGE_SPEED item sets, m/s; NaN or negative if it sets none; 0 for other items."""
     return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0

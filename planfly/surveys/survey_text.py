@@ -67,8 +67,9 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
 
 
 def line_text(number: int, measure: LineMeasure | None) -> str:
-    """Describe the length of a photo line, its usable fraction, and the causes of the loss.
+    """Return a line of text on a photo line: its length, its usable fraction, and the causes of the loss.
 
+    number: number of the line, from 1.
     measure: measure of the line; None if it was not flown.
     """
     if measure is None:
@@ -85,14 +86,15 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
 
 
 def survey_text(survey: Survey) -> str:
-    """Describe the lines, spacing and course of a survey."""
+    """Return a text on the number of lines, the spacing and the course of a survey."""
     course = round(math.degrees(survey.course)) % 360
     return f"{count_text(len(survey.lines), 'line')}, {survey.spacing:.0f} m apart, the first on course {course}°"
 
 
 def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> tuple[str, ...]:
-    """Return texts on the photo overlap along and across the lines, or on why it is not judged.
+    """Return texts on the photo overlap along and across the lines, or one text with the reason why it is not judged.
 
+    measure: measured overlap; None if the camera is unknown.
     is_flown: True if at least one line was flown.
 
     >>> overlap_lines(None)
@@ -156,7 +158,7 @@ def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
 
 
 def slow_camera_text(measure: OverlapMeasure) -> str:
-    """Describe the distance between the photos of a camera that is too slow for the stated distance."""
+    """Return a text on a camera that is too slow for the stated distance between photos, with its own distance."""
     return (
         f"the camera is too slow for the distance between photos: one every {measure.camera.interval:g} s, or"
         f" {measure.photo_spacing:.0f} m"
@@ -173,10 +175,11 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe the length lost at the ends of the lines, which indicates the needed turn-around distance.
+    """Return a text on the length lost at the ends of the lines, which indicates the needed turn-around distance.
 
-    If no line has a usable part, the text says that instead.
-    lines: None for a line that was not flown.
+    If no line has a usable part, the text states that instead.
+
+    lines: measure of each line; None for a line that was not flown.
     """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
@@ -198,7 +201,7 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
 
 
 def near_miss_text(near_miss: NearMiss) -> str:
-    """Describe the trial that came closest to passing, and the reason of its failure."""
+    """Return a text on the trial that came closest to passing, and on the reason of its failure."""
     return (
         f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used, the worst one to"
         f" {near_miss.worst:.0f} % of its length; {near_miss.verdict.headline}"
@@ -206,7 +209,10 @@ def near_miss_text(near_miss: NearMiss) -> str:
 
 
 def remedy_text(remedy: SurveyRemedy, length: float) -> str:
-    """Describe a remedy and the path length that it costs.  length: length of the current route, m."""
+    """Return a text on a remedy, with the path length before and after it.
+
+    length: length of the current route, m.
+    """
     match remedy.kind:
         case "side":
             change = "the lines in the opposite order"

@@ -1,6 +1,6 @@
 """Apply a suggestion of a failed finding to the items of the mission.
 
-A suggestion states a change of the path.  This module chooses the items to move, as few as possible and by the minimum
+A suggestion states changes of the path.  This module chooses the items to move, as few as possible and by the minimum
 distance that the finding requires.  An item of a landing sequence is not moved to a side, because the landing point
 would remain where it is.  Suggestions about the aircraft, such as a larger battery, change no mission.
 """
@@ -57,8 +57,8 @@ def apply_suggestion(
 ) -> Mission:
     """Return the mission with one suggestion of a finding applied.
 
-    If several items can be moved, all choices are tried.  The mission with the fewest failed findings is returned;
-    among equal ones, the mission with the fewest findings that become failed or undecided.
+    If several items can be moved, all choices are tried, and judged by geometry.  The mission with the fewest failed
+    findings is returned; among equal ones, the mission with the fewest findings that become failed or undecided.
     If the suggestion states moves of items, no other item is moved.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
@@ -108,18 +108,19 @@ def apply_suggestion(
 
 
 def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
-    """Return the rule and place of each failed or undecided finding, mapped to True if the finding failed."""
+    """Return the failed and undecided findings of a verdict, as {(rule, place): True if failed, False if undecided}."""
     open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
     return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 
 
 def item_moves(context: MissionContext, before: Mission, after: Mission) -> tuple[ItemMove, ...]:
-    """Return the moves of the items between two missions.
+    """Return the moves of the items from one mission to another; items that stay are left out.
 
     The result is empty if items were inserted, as for a change of airspeed.
 
-    A change of altitude is 0 if the altitude is unknown.  An item that only gets a height above terrain, which its
-    suggestion states, does not move.
+    A change of altitude is 0 if the altitude is unknown.  Stating an altitude as a height above terrain is not a move.
+
+    before, after: the mission before and after its items were moved.
     """
     if len(before.items) != len(after.items):
         return ()
@@ -153,15 +154,16 @@ class _Choice:
 
 
 class _EditedMission:
-    """Mission whose items are moved one by one."""
+    """Mission whose items are moved one by one, with the route and the route requirements before the moves."""
 
     def __init__(
         self, context: MissionContext, judged: JudgedMission, choice: _Choice, moved_items: frozenset[int]
     ) -> None:
         """Start with the unchanged mission.
 
-        judged: the mission with its verdict.  choice: choice of the items to move.
-        moved_items: numbers of the only items that may move; empty if any may.
+        judged: the mission with its verdict.
+        choice: choice of the items to move.
+        moved_items: numbers of the only items that may move; empty if all items may move.
         """
         self.moved_items = moved_items
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
@@ -179,17 +181,20 @@ class _EditedMission:
         self.offsets: dict[int, Floats] = {}
 
     def item_index(self, waypoint: int) -> int | None:
-        """Return the index of a waypoint's item in the list of items; None for a waypoint without an item."""
+        """Return the index in the mission's list of the item of a waypoint; None for a waypoint without an item.
+
+        waypoint: number of the waypoint in the route.
+        """
         seq = int(self.route.items[waypoint])
         indices = [index for index in movable_indices(self.mission) if self.mission.items[index].seq == seq]
         return indices[0] if indices else None
 
     def waypoint_positions(self) -> Floats:
-        """Return the waypoints of the unchanged route, (w, 3) m."""
+        """Return the positions of the waypoints before all moves, (w, 3), m."""
         return np.asarray(self.route.positions)
 
     def current_position(self, waypoint: int) -> Floats:
-        """Return the position (3,) of a waypoint with all moves so far, m."""
+        """Return the position of a waypoint after the moves made so far, (3,), m."""
         index = self.item_index(waypoint)
         offset = np.zeros(3) if index is None else self.offsets.get(index, np.zeros(3))
         return np.asarray(self.route.positions[waypoint] + offset)
@@ -200,7 +205,9 @@ class _EditedMission:
         return index is not None and self.mission.items[index].command in LANDINGS
 
     def move_items(self, waypoints: Sequence[int], offset: Floats, *, along_approach: bool = False) -> None:
-        """Move the items of waypoints, except landings; an item with several waypoints is moved once.
+        """Move the items of waypoints by an offset; an item with several waypoints is moved once.
+
+        Landings stay, and so do items that may not move (`moved_items`).
 
         offset: east, north and up, m.
         along_approach: True for a move along the final approach, the only direction in which items of a landing
@@ -230,9 +237,9 @@ class _EditedMission:
             self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
     def end_waypoints(self, legs: Sequence[int]) -> list[int]:
-        """Return the indices of the waypoints at the ends of the legs.
+        """Return the numbers of the waypoints at the ends of legs, ascending.
 
-        The first and last waypoint of the route are left out unless there are no other waypoints.
+        The first and last waypoint of the route are left out unless the legs have no other ends.
         """
         ends = sorted({end for leg in legs for end in (leg, leg + 1)})
         inner_ends = [end for end in ends if 0 < end < self.route.legs]
@@ -266,7 +273,7 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg to the wanted rise, by moving one or both of its ends."""
+    """Reduce the climb or descent of a leg to the wanted change of altitude, by moving one or both of its ends."""
     leg = _changed_leg(change, edited.route)
     excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
@@ -278,7 +285,7 @@ def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> N
 
 
 def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route.
+    """Set the airspeed on a leg, on the legs before and after a waypoint, or on the whole route.
 
     If the suggestion allows a range of airspeeds, the middle of the range is set.
     """
@@ -297,7 +304,7 @@ def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) 
 
 
 def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Make a turn gentler by moving the waypoint towards the line between its neighbours.
+    """Move a waypoint towards the line between its neighbours, as far as its turn needs to become gentle enough.
 
     The waypoint is not moved if it is an end of the route, or if no move makes the turn gentle enough.
     """
@@ -322,9 +329,9 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
 
 
 def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Raise or lower a waypoint, a leg, or the legs that violate a zone, by a step.
+    """Raise or lower a waypoint, a leg, or the legs that violate a zone, by the wanted step.
 
-    A waypoint between two legs moves by the larger of their two steps, because earlier changes are subtracted.
+    If the changes for two legs move the waypoint between them, it moves by the larger step, not by their sum.
     """
     sign = 1.0 if change.what == "height" else -1.0
     if change.place.kind == "waypoint" and change.place.index is not None:
@@ -361,12 +368,12 @@ def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Findin
 
 
 def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """State the altitude of a leg's end as a height above terrain.
+    """State the altitude of a leg's end as a height above terrain, so that the leg follows the ground.
 
     The mission is not changed without a terrain, or if the end has no item.
 
-    If the start of the leg is below the required height, it is raised in its own altitude frame, because another leg
-    leads to it.
+    If the start of the leg is below the required height, it is raised, but keeps its altitude frame, because another
+    leg leads to it.
     """
     leg = _changed_leg(change, edited.route)
     terrain, index = edited.context.scenario.terrain, edited.item_index(leg + 1)
@@ -394,7 +401,7 @@ def _end_with_loiter(edited: _EditedMission, change: Change, _finding: Finding) 
 
 
 def _change_loiter_radius(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Set the radius of a loiter's item; it circles in the same direction as before."""
+    """Set the radius of a loiter, and keep its direction; a waypoint without an item is not changed."""
     index = None if change.place.index is None else edited.item_index(change.place.index)
     if index is not None:
         edited.mission = set_loiter_radius(edited.mission, index, change.wanted)
@@ -402,7 +409,7 @@ def _change_loiter_radius(edited: _EditedMission, change: Change, _finding: Find
 
 
 def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Move waypoints that are outside the area, or too close to its borders, into the area.
+    """Move the waypoints outside the scenario's area into it, to the wanted distance from its borders.
 
     Borders are the edges, the floor and the ceiling.
     """

@@ -96,7 +96,7 @@ _SETTINGS = ("AIRSPEED_CRUISE", "ROLL_LIMIT_DEG")
 
 @dataclass(frozen=True, slots=True)
 class AircraftParameters:
-    """Parameters of a file that describe the aircraft and differ from their defaults.
+    """Parameters of an autopilot's file that describe the aircraft and differ from their defaults.
 
     values: value of each parameter in ArduPlane's unit, by its current ArduPlane name.  AIRSPEED_STALL is only read
         from PX4 files.
@@ -151,7 +151,7 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftParameters) -> list[str]:
-    """Describe the parameters of a file that are not used because the data sheet states other values.
+    """Return a text for each parameter of a file that is not used because the data sheet states another value.
 
     numbers: numbers of the data sheet by keyword, in the units of the options; None or 0 if not stated.
 
@@ -168,8 +168,9 @@ def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftPa
 
 
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
-    """Fill the missing values of a data sheet from parameters by ArduPlane's names; return the new sheet.
+    """Return a data sheet whose missing values are filled from parameters.
 
+    parameters: values by ArduPlane's names, in ArduPlane's units.
     TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX (libraries/AP_TECS/AP_TECS.cpp).
 
     >>> sheet = DataSheet(2.1, 1.6, 0.0, 0.0)
@@ -215,8 +216,10 @@ _DIAMETER_IN = (3.0, 40.0)
 def parse_sheet(
     numbers: Mapping[str, float | None], *, battery: str | None, prop: str | None, layout: str | None
 ) -> DataSheet:
-    """Make a data sheet from command-line options, with angles in degrees.
+    """Make a data sheet from command-line options.
 
+    numbers: value by option, in the units of `RANGES` (angles in degrees); None if not given.
+    battery, prop, layout: texts such as "14.8V,5Ah", "12x6" and "wing"; None if not given.
     Raises FlightError with a one-line message for input that cannot be read.
 
     >>> sheet = parse_sheet({"mass": 2.1, "climb": 10.0}, battery="14.8V,5Ah", prop="12x6", layout="wing")
@@ -307,7 +310,7 @@ STATED_DRAG_LOG_SD = 0.15
 
 
 def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty, Draws]:
-    """Return the uncertainty of a data sheet's model, and aircraft drawn from it.
+    """Return the uncertainty of a data sheet's model, and a sample of aircraft drawn from it.
 
     The uncertainty has standard deviations of factors on model properties, and of the resulting climb, descent, top
     speed and power at cruise.  All factors are independent except the factor on thrust.  An aircraft with more drag has
@@ -392,7 +395,7 @@ def climb_deviation(sized: SizedAircraft) -> float:
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Compute climb angle (rad), descent angle (rad), top speed (m/s) and log of cruise power (W), (4,).
+    """Return climb angle (rad), descent angle (rad), top speed (m/s) and logarithm of the cruise power (W), (4,).
 
     The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
     in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.
@@ -415,13 +418,13 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the signed effect (n,) of a factor on path angles and speeds: (increased - decreased) / 2.
+    """Return the signed effect of a factor on each performance value: (increased - decreased) / 2, (n,).
 
-    A value is NaN if the aircraft cannot be trimmed.  If one of `increased` and `decreased` is NaN, the effect is the
-    difference between the other one and `estimated`.  If both are NaN, it is the magnitude of `estimated`.
+    If one of the two is NaN, because the aircraft cannot be trimmed, the effect is the difference between the other one
+    and `estimated`.  If both are NaN, it is the magnitude of `estimated`.
 
-    increased, decreased: values (n,) with the factor increased and decreased.
-    estimated: values (n,) with the estimated factor.
+    increased, decreased: performance values (n,) with the factor increased and decreased.
+    estimated: performance values (n,) with the factor as estimated.
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
     >>> factor_effect(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
@@ -446,7 +449,7 @@ _MAX_PITCH_DEG = 25.0
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Trim points of the model at altitude `AMSL`.
+    """Trim points of the model at the altitude `flight.guidance.model_gains.AMSL`.
 
     level, climb, idle: level flight, steepest climb at full throttle and descent at idle, all at cruise speed.
     slowest, fastest: slowest and fastest level flight.
@@ -505,7 +508,8 @@ def make_data_sheet_folder(
 def _parameter_lines(stated: AircraftParameters, overridden: Sequence[str]) -> list[str]:
     """Return lines of ``README.md`` on the values of a parameter file; [] without such values.
 
-    overridden: texts on the parameters that the data sheet overrides.
+    stated: values of the parameter file.
+    overridden: texts on the parameters that the data sheet overrides, as from `overridden_texts`.
     """
 
     def is_used(text: str) -> bool:
@@ -536,9 +540,11 @@ def _file_texts(
 ) -> dict[str, str]:
     """Return the text of each file of the aircraft's folder, by file name.
 
+    name: name of the aircraft.
     draft_folder: temporary folder for a draft of the aircraft, from which trims and gains are computed.
+    file_parameters: values of the parameter file by ArduPlane's names, without overridden values.
     readme_lines: lines of ``README.md`` on the parameter file.
-    climb_names: parameters from which the climb is derived.
+    climb_names: names of the parameters from which the climb is derived, as text.
     """
     folder = draft_folder / name
     folder.mkdir()
@@ -625,7 +631,11 @@ def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
 
 
 def _metadata_text(sized: SizedAircraft, stall: float, min_airspeed: float, max_airspeed: float) -> str:
-    """Return the text of ``name.toml``.  stall, min_airspeed, max_airspeed: m/s."""
+    """Return the text of the aircraft's TOML file, named after the aircraft.
+
+    stall: stall speed, m/s.
+    min_airspeed, max_airspeed: airspeeds that guidance may use, m/s.
+    """
     numbers, sheet = sized.numbers, sized.sheet
     elevator, aileron, rudder = (math.degrees(value) for value in numbers.throw)
     energy = (
@@ -717,7 +727,7 @@ def arduplane_parameters_text(
 
 
 def servo_text(aircraft: Aircraft, performance: Performance) -> str:
-    """Return the text of ``ardupilot.toml``: servo outputs and pulses of surfaces and throttle.
+    """Return the text of ``ardupilot.toml``: the servo output and pulses of each surface and of the throttle.
 
     Elevons and V-tails are mixed within the model.
     """
@@ -780,7 +790,7 @@ def missed_value_lines(
 ) -> list[str]:
     """Return lines of ``README.md`` on the values of a parameter file that the model does not meet.
 
-    cruise: m/s.
+    cruise: cruise airspeed, m/s.
     climb_shortfall: as in `SizedAircraft`.
     """
     throttle = 100.0 * performance.level.throttle
@@ -800,19 +810,18 @@ def missed_value_lines(
 
 
 def _climb_names(stated: AircraftParameters) -> list[str]:
-    """Return the names of the climb rate and its throttle in a file, if the rate is not at full throttle.
+    """Return the names that a file uses for TECS_CLMB_MAX and THR_MAX, if the climb rate is not at full throttle.
 
-    They are the names that the file uses for TECS_CLMB_MAX and THR_MAX.  Returns [] unless both differ from their
-    defaults; the default of THR_MAX is full throttle.
+    Returns [] unless both parameters differ from their defaults; the default of THR_MAX is full throttle.
     """
     names = ("TECS_CLMB_MAX", "THR_MAX")
     return [stated.texts[name].split()[0] for name in names] if stated.values.keys() >= set(names) else []
 
 
 def _value_lines(sized: SizedAircraft, climb_names: str) -> list[str]:
-    """Return the rows of the table in ``README.md``: the values of the sheet and their sources.
+    """Return the rows of the table in ``README.md``: each value of the sheet with its source.
 
-    climb_names: parameters from which the climb is derived.
+    climb_names: names of the parameters from which the climb is derived, as text.
     """
     lines = []
     for field, title, unit, factor in _README_ROWS:

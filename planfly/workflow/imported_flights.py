@@ -58,7 +58,7 @@ _MIN_ITEMS = 2
 class ImportedFlight:
     """Imported flight with its verdict.
 
-    setup: setup of the flight, with the log as its source.
+    setup: setup with which the flight is judged, with the log as its source.
     track: rows of the flight.
     events: messages of the vehicle.
     ended: description of the flight's end, according to the log.
@@ -158,12 +158,12 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
 
 
 def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Read the planned mission.
+    """Return the planned mission, a description of its source, and the scenario of its plan.
 
-    Return the mission, a description of its source, and the scenario of its plan.
+    The mission is the one that the options name, or else the mission in the log.  The scenario is None without a
+    plan.json.
 
-    The scenario is None without a plan.json.
-
+    path: path of the log, for messages.
     Raises LogError if the options name no mission, and the log contains none or too few of its items.
     """
     if (named_plan := options.get("plan")) is not None:
@@ -192,7 +192,7 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
 def _choose_scenario_and_place_mission(
     mission: Mission, options: LogOptions, plan_scenario: Scenario | None
 ) -> tuple[Scenario, PlacedMission]:
-    """Return the scenario for judging a flight, and the mission placed in this scenario.
+    """Choose the scenario for judging a flight; return it, and the mission placed on its map.
 
     The scenario is (in order) the named scenario, the scenario of the plan, or a scenario implied by the mission.
     """
@@ -210,9 +210,10 @@ def _choose_scenario_and_place_mission(
 
 
 def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
-    """Return the scenario with the log's mean wind, and a description of the source of the wind.
+    """Return the scenario with the log's mean wind, and a text on the source of the wind for the notes.
 
-    The wind of the scenario is kept if the options state a wind or the log contains none.
+    The wind of the scenario is kept if the options state a wind or the log contains none.  The text is "" if neither a
+    log nor a named scenario states a wind.
     """
     if options.get("wind") is not None:
         return scenario, "as given"
@@ -266,7 +267,7 @@ def _flight_setup(
 
 
 def _describe_log(flight: LoggedFlight) -> tuple[str, ...]:
-    """Return notes on a log that is incomplete, has other flights, or has a constant throttle, as that of a glider."""
+    """Return notes on a log that is incomplete, contains several flights, or has a throttle that never moves."""
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -292,7 +293,7 @@ def _describe_log(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Return a note on the differences between the log's mission and the named plan.
+    """Return one note on the differences between the log's mission and the named plan.
 
     Return () if they agree, if no plan is named, or if the log contains no mission.
     """
@@ -351,11 +352,11 @@ def fly_again(
     advance: Advance,
     max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
-    """Simulate each sequence of followed legs in the wind of the log, and compare it with the log.
+    """Simulate each sequence of legs that the flight followed, in the wind of the log, and compare it with the log.
 
     Return the comparisons, the longest sequence first.
 
-    setup: setup of the imported flight, with `imported_log`.
+    setup, track: setup of the imported flight, with `imported_log`, and its rows.
     aircraft: aircraft of the simulated flight; None for the setup's aircraft.
     turbulence: turbulence of the simulated flight; None for the scenario's turbulence.
     max_stretches: maximum number of sequences; if there are more, the longest are flown.
@@ -370,9 +371,7 @@ def fly_again(
 
 @dataclass(frozen=True, slots=True)
 class DrawnFlight:
-    """Sampled deviations of one simulated flight.
-
-    They are deviations from the nominal aircraft, the log's wind and the logged positions.
+    """Draw for one simulated flight: its deviations from the nominal aircraft, the log's wind and the logged positions.
 
     variation: deviation of the aircraft from its model.
     wind: velocity added to the log's mean wind, towards north and east, m/s.
@@ -391,10 +390,9 @@ class DrawnFlight:
 def fly_draws(
     setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
 ) -> tuple[Reflight, ...]:
-    """Simulate the longest sequence of followed legs once per draw; return the comparisons with the log.
+    """Simulate the longest sequence of legs that the flight followed once per draw; return the comparisons.
 
-    A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if its aircraft cannot start or
-    flies none of the legs.
+    A draw is left out if its aircraft cannot start or flies none of the legs.
 
     setup, track: setup and track of the logged flight.
     aircraft: name or folder of the aircraft that is varied.
@@ -418,7 +416,7 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Replace a take-off item by a waypoint at the place where the flight had climbed to its altitude.
+    """Return the setup with a first take-off item replaced by a waypoint where the flight reached its altitude.
 
     A model's flight starts in the air, and a mission does not state the course of its take-off: the autopilot chooses
     it.  The setup is returned unchanged if the mission has no take-off, or if the first segment of the flight did not
@@ -466,8 +464,9 @@ def _refly_followed_legs(
     advance: Advance | None,
     draw: DrawnFlight | None = None,
 ) -> Reflight:
-    """Simulate followed legs with the model of an aircraft, and compare the flight with the log.
+    """Simulate a sequence of legs with the model of an aircraft, and compare the simulated flight with the log.
 
+    legs: the sequence of legs, as the logged flight followed it.
     aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.
     advance: called with the distance flown, the total (m) and a text; None to report nothing.
     draw: variations of aircraft, wind and start of one sampled flight, or None.
@@ -517,7 +516,7 @@ def _refly_followed_legs(
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
-    """Return the legs followed in each segment of a flight; the segment with the most legs comes first.
+    """Return the sequence of legs followed in each segment of a flight, the longest first.
 
     Raises LogError if the flight followed no leg of its mission.
     """

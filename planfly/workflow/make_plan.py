@@ -41,7 +41,7 @@ def make_plan(
     flown_plan_and_leg: tuple[Plan, int] | None = None,
     continues: bool = False,
 ) -> Plan:
-    """Plan a path within the limits of scenario and aircraft, reduced by the uncertainty of the limits.
+    """Plan a path within the limits of scenario and aircraft, with a margin for the uncertainty of the limits.
 
     All commands use this function, so that they agree on which plan is safe.  A plan may take several searches, which
     share the scenario's budget of evaluations.  In gusts, the plan has few waypoints at which the autopilot may orbit
@@ -49,6 +49,8 @@ def make_plan(
     turns also hold in the local wind of a forecast (`planfly.planning.local_wind`).  Departure and approach are added.
     If the autopilot loiters at the end of the mission, the certificate names hazards that may be close to the loiter.
 
+    seed: seed of the search.
+    algorithm: name of the algorithm; None for the default.
     stop: stop condition of `planner.search.plan_path.plan_path`.
     flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.
     continues: True if the mission continues beyond the destination of the plan.
@@ -111,7 +113,10 @@ def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
 
 
 def make_given_plan(scenario: Scenario, uav: Uav, seed: int, waypoints: Floats) -> Plan:
-    """Make a plan from given waypoints (w, 3), m, and certify it by all checks of `make_plan`."""
+    """Make a plan from given waypoints, and certify it by all checks of `make_plan`.
+
+    waypoints: positions, m, (w, 3), all of which are kept.
+    """
     return finish_plan(
         certify_waypoints(scenario, uav.limits.with_margin(), waypoints, seed=seed), uav, keeps_waypoints=True
     )
@@ -128,9 +133,7 @@ def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoint
 
 
 def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Add departure and approach to a plan, and complete its certificate.
-
-    The departure and the approach are those that the scenario requires.
+    """Add to a plan the departure and the approach that the scenario requires, and complete its certificate.
 
     The certificate then names the hazards near the final loiter, and the slopes and turns that cannot be flown in the
     local wind.

@@ -27,7 +27,7 @@ from world.scenario import Scenario
 
 @dataclass(frozen=True, slots=True)
 class JudgedMission:
-    """Mission with its setup, its route requirements and its geometric verdict."""
+    """Mission with its setup, its route requirements and its verdict, by geometry or on a flight."""
 
     mission: Mission
     setup: FlightSetup
@@ -39,7 +39,9 @@ class JudgedMission:
 class MissionContext:
     """Context in which a changed mission is judged.
 
-    scenario: world of the mission.  uav: aircraft loaded for the mission.  seed: seed of the flight.
+    scenario: world of the mission.
+    uav: aircraft loaded for the mission.
+    seed: seed of the flight.
     opened_setup: the setup as it was opened, with its plan if there is one.
     planned: True if planfly set the acceptance radii, which then follow the turns.
     """
@@ -64,7 +66,7 @@ class MissionContext:
     # Places.
 
     def place_mission(self, mission: Mission) -> PlacedMission:
-        """Return the stops of a mission on the map, with jumps unrolled."""
+        """Return a mission with its stops on the map; jumps are unrolled."""
         resets = self.uav.autopilot.checks.resets_jump_counters
         scenario = self.scenario
         return place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets)
@@ -72,7 +74,9 @@ class MissionContext:
     def item_positions(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
         """Return the positions (n, 3) of the movable items: east, north and altitude AMSL, m.
 
-        Movable items are those of `flight.mission.edits.movable_indices`.
+        Movable items are those of `flight.mission.edits.movable_indices`, in this order.
+
+        placed: the mission placed on the map, if already computed.
 
         The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has its stated
         altitude, or NaN if this is unknown.
@@ -111,12 +115,12 @@ class MissionContext:
         return frozenset(stop.item for stop in self.place_mission(mission).stops)
 
     def to_geographic(self, east: float, north: float) -> tuple[float, float]:
-        """Return latitude and longitude of a map position, degrees."""
+        """Return latitude and longitude, degrees, of a map position, m."""
         lat, lon = to_geo(self.scenario.origin, east, north)
         return float(lat), float(lon)
 
     def with_updated_radii(self, mission: Mission, index: int) -> Mission:
-        """Adapt the acceptance radii near a moved item to the new turns, and return the mission.
+        """Return the mission with the acceptance radii near a moved item adapted to the new turns.
 
         A mission that planfly did not plan keeps its radii.
 
@@ -150,7 +154,10 @@ class MissionContext:
     # Verdicts.
 
     def setup(self, mission: Mission) -> FlightSetup:
-        """Make the flight setup of a mission.  Raises MissionError for a mission that cannot be laid out."""
+        """Return the flight setup of a mission; the opened setup if the mission has not changed.
+
+        Raises MissionError for a mission without a valid route.
+        """
         opened = self.opened_setup
         # The mission of the setup names its autopilot, so compare the items and home, not the missions.
         is_opened_mission = mission.items is opened.mission.items and mission.home == opened.mission.home
@@ -159,7 +166,7 @@ class MissionContext:
         return make_setup(self.scenario, self.uav, mission, self.seed, placed=self.place_mission(mission))
 
     def setup_with_parameters(self, mission: Mission, parameters: Mapping[str, float]) -> FlightSetup:
-        """Make the flight setup of a mission with other values of the autopilot's parameters, by name."""
+        """Return the flight setup of a mission with other values of some autopilot parameters, by name."""
         uav = replace(self.uav, autopilot=self.uav.autopilot.with_parameters(**parameters))
         return make_setup(self.scenario, uav, mission, self.seed, placed=self.place_mission(mission))
 

@@ -55,7 +55,7 @@ def open_flight(
 
     The scenario is the named scenario, the scenario of the plan, or for a mission file a scenario implied by its items.
 
-    program: the autopilot program that flies, or None for a simulated autopilot.
+    program: executable of the autopilot that flies; None for a simulated autopilot.
     engine: flight model that flies.
     Raises MissionError, ScenarioError, ParameterError or TerrainError.
 
@@ -91,7 +91,7 @@ def open_flight(
 
 
 def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
-    """Extend a scenario's terrain to the mission's home, if the link's ground station stands there.
+    """Return a scenario with its terrain extended to the mission's home, if the link's ground station stands there.
 
     The terrain is unchanged if its elevation file cannot be read, or has no data at home.
     """
@@ -115,7 +115,7 @@ def _open_plan(
 ) -> FlightSetup:
     """Make the flight setup of a plan, in its own scenario or in another scenario that the options name.
 
-    program: autopilot program that flies the mission; None for a simulated autopilot.
+    program: executable of the autopilot that flies the mission; None for a simulated autopilot.
     engine: choice between the compiled flight model and JSBSim.
     fences: fences and zones in addition to those of the plan.
     terrain: elevation file that replaces the terrain of the plan; None keeps the terrain.
@@ -140,9 +140,9 @@ def _open_plan(
 
 
 def check_mission_exists(path: Path) -> Path:
-    """Check that a mission file exists, and return its path.
+    """Return the path unchanged, after checking that it is an existing file.
 
-    Raises MissionError with the most similar name as a suggestion, and for a scenario.
+    Raises MissionError for a missing file, with the most similar name as a suggestion, and for a scenario.
     """
     if path.suffix.lower() == ".toml" or (str(path) in embedded_names() and not path.exists()):
         text = "a scenario, which has to be planned first: `planfly run` or planfly.plan_then_fly plan and fly it"
@@ -188,7 +188,10 @@ def make_setup(
     """Make the setup of a mission's flight in a scenario.
 
     placed: the mission placed on the map of the scenario, if already computed.
-    fdm_hz: step rate of JSBSim, Hz.  engine: flight model that flies.
+    seed: seed of the turbulence and the navigation error.
+    plan: plan from which the mission was made; None for a mission from a file.
+    fdm_hz: step rate of JSBSim, Hz.
+    engine: flight model that flies.
     Raises MissionError for a mission without a valid route, and for a fence without valid zones; and ForecastError if
     the route leaves the area, altitude levels or times of the wind's forecast.
     """
@@ -246,9 +249,9 @@ def make_setup(
 
 
 def planned_duration(route: Route, mission: Mission) -> float:
-    """Return the duration of a flight without wind, s.
+    """Return the duration of a mission's flight without wind, s; a loiter takes at least the time that its item states.
 
-    A loiter takes at least the time that its item states.
+    route: route of the mission.
     """
     leg_times = np.linalg.norm(np.diff(route.positions, axis=0), axis=1) / route.leg_airspeeds
     stops = route.stops
@@ -261,9 +264,9 @@ def planned_duration(route: Route, mission: Mission) -> float:
 
 
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
-    """Return the autopilot with an RTL that uses the mission's landing sequence.
+    """Return the autopilot with parameters by which an RTL uses the mission's landing sequence.
 
-    Without a landing sequence the autopilot is unchanged.  Parameters that a parameter file or the scenario states are
+    Without a DO_LAND_START the autopilot is unchanged.  Parameters that a parameter file or the scenario states are
     kept; the others are assumed.
     """
     if all(item.command != Command.DO_LAND_START for item in mission.items):
@@ -281,7 +284,8 @@ def _autopilot_notes(mission: Mission, autopilot: Autopilot, battery: float, vol
     another capacity than the aircraft's battery has, because they act too early or too late.  If several monitors share
     the load, each has its own battery, so nothing is noted.
 
-    battery: energy of the battery, Wh.  volts: its voltage, V; 0 if unknown.
+    battery: energy of the battery, Wh.
+    volts: voltage of the battery, V; 0 if unknown.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -471,7 +475,7 @@ _LEVEL_TEXT = "is level"
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Yield a note on wind and ground at a landing for which the scenario has no landing strip."""
+    """Yield one note on wind and ground at the mission's landing; nothing if the scenario states its landing strip."""
     last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:

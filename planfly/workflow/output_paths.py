@@ -105,7 +105,8 @@ def check_output_file(
 def check_output_folder(folder: Path, overwrite: bool) -> None:
     """Raise PlanflyError if an output folder cannot or must not be written.
 
-    The path must not be a file or below a file, and the folder must be writable; without `overwrite` it must be empty.
+    The path must not be a file or below a file, and the folder must be writable; without `overwrite` it must be missing
+    or empty.
     """
     existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not existing.is_dir():
@@ -120,8 +121,8 @@ def check_output_folder(folder: Path, overwrite: bool) -> None:
 def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
     """Make a folder if it is missing, and remove old results of planfly from it, but no other file.
 
-    files: names of the results.  With `RUN_FILES`, the results of earlier rounds and the pictures of a report are
-    removed, too.
+    files: names of the results.  If it is `RUN_FILES` itself, the results of earlier rounds and the pictures of a
+        report are removed, too.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
@@ -137,9 +138,11 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Check a folder with `check_output_folder`, make it, and remove old results of planfly from it.
+    """Check an output folder, make it if it is missing, and remove old results of planfly; return its path.
 
-    Returns the path of the folder.
+    files: names of the results to remove, as for `prepare_folder`.
+    overwrite: True permits a folder that is not empty.
+    Raises PlanflyError as `check_output_folder`.
     """
     folder = Path(out)
     check_output_folder(folder, overwrite)
@@ -148,9 +151,10 @@ def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) ->
 
 
 def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrite: bool) -> tuple[Path, ...]:
-    """Write files into a folder, replacing those of an earlier result, and return their paths.
+    """Write files into a folder, and return their paths; files of an earlier result are replaced if `overwrite`.
 
     contents: content of each file by its name.
+    Raises PlanflyError as `check_output_folder`.
     """
     clean_folder(folder, tuple(contents), overwrite=overwrite)
     for name, content in contents.items():
@@ -159,7 +163,7 @@ def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrit
 
 
 def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
-    """Replace {name} and {seed} in a path; characters that are unsafe in a folder's name are replaced.
+    """Return the path `target` with {name} and {seed} replaced; unsafe characters of the name become "-".
 
     If this changes the name, the first digits of the name's SHA-256 are appended, so that different names stay
     different.

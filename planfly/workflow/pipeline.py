@@ -1,4 +1,4 @@
-"""Plan, fly, record and judge a mission and returns from it, with one function for each stage."""
+"""Plan, fly, record and judge a mission and its returns to launch, with one function for each stage."""
 
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
@@ -99,10 +99,10 @@ class OffNominal:
 
 @dataclass(frozen=True, slots=True)
 class ReturnSummary:
-    """Returns from a few points of a flight, simulated only with a point mass, to accompany its verdict.
+    """Returns to launch from a few points of a flight, simulated with a point mass, to accompany its verdict.
 
     line: summary of all returns in a line; "" if no return can be judged.
-    world, starts, returns: data of the returns; None if no return is judged.
+    world, starts, returns: environment, start points and results of the returns; None if no return is judged.
     """
 
     line: str = ""
@@ -112,7 +112,7 @@ class ReturnSummary:
 
     @property
     def has_failures(self) -> bool:
-        """True if a return is unsafe."""
+        """True if a return is unsafe; False if none is judged."""
         returns = self.returns
         return returns is not None and bool(returns.each) and not (returns.safe or returns.undecided)
 
@@ -139,7 +139,7 @@ class FlownMission:
     events: entries of the log in addition to the rows.
     log: the file of the flight log; None if no log was requested or nothing was flown.
     autopilot_log: the autopilot program's own log, next to the flight log, if such a program flew.
-    returns: returns from a few points of the flight, as recorded in the log; None without a log.
+    returns: returns to launch from a few points of the flight, as recorded in the log; None without a log.
     engine: flight model that flew, and the reason; "" if nothing was flown.
     reference: the results of reference flights; None if none were flown.
     """
@@ -172,12 +172,12 @@ class FlownMission:
 
     @property
     def returns_line(self) -> str:
-        """One line on returns from a few points of the flight; "" for a mission without a home."""
+        """One line on returns to launch from a few points of the flight; "" for a mission without home or terrain."""
         return self.return_summary.line
 
     @property
     def return_summary(self) -> ReturnSummary:
-        """Returns from a few points of the flight; without a log they are computed at each call."""
+        """Returns to launch from a few points of the flight; without a log they are simulated at each call."""
         return return_summary(self.setup, self.track) if self.returns is None else self.returns
 
     def __repr__(self) -> str:
@@ -380,9 +380,9 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
 def return_summary(
     setup: FlightSetup, track: Track | None, requirements: RouteRequirements | None = None
 ) -> ReturnSummary:
-    """Judge returns from a few points of a flight or planned path.
+    """Judge simulated returns to launch from a few points of a flight, or of the planned path if there is no track.
 
-    The summary is empty without home or terrain.
+    The summary is empty without home or terrain.  If an error prevents the judgement, its line states the error.
 
     requirements: the setup's route requirements if already known.
     """

@@ -58,7 +58,7 @@ def find_passing_parameter(
     *,
     only_reached_limits: bool = False,
 ) -> DecidingParameter | None:
-    """Find an autopilot parameter with which a failed flight passes, and its nearest value that passes.
+    """Find an autopilot parameter with which a failed flight passes, and the passing value nearest to its own value.
 
     The autopilot lists the parameters to try, the candidates.  Returns None if none of them makes the flight pass.
 
@@ -125,10 +125,10 @@ def find_passing_parameter(
 def _nearest_passing_value(
     current: float, step: float, farthest: float, passes: Callable[[float], bool]
 ) -> float | None:
-    """Return the passing value nearest to the current value, in steps to `farthest`.
+    """Return the passing value nearest to the current value; None if neither the farthest nor the middle value passes.
 
-    The search begins at `farthest`; if this value fails, it begins halfway, because a parameter can also be changed too
-    much.  Returns None if both fail.
+    Values are tried in steps from `current` to `farthest`.  The search begins at `farthest`; if this value fails, it
+    begins halfway, because a parameter can also be changed too much.
 
     passes: function that flies with a value of the parameter and returns True if the flight passes.
     """
@@ -170,9 +170,7 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 def judge_airframe_flight(
     setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
 ) -> AirframeAnswer:
-    """Fly a setup with planfly's guidance and no navigation error, and judge the flight.
-
-    The flight shows whether the airframe, without its autopilot, can fly the mission.
+    """Fly a setup with planfly's guidance and no navigation error, to find out if the airframe can fly the mission.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -195,7 +193,9 @@ def judge_airframe_flight(
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find an autopilot parameter that makes a failed flight pass at another value, or return None.
+    """Find an autopilot parameter that makes a failed flight pass if it has another value; None if none is found.
+
+    The result is also None for a flight that passes, and for an autopilot without parameters.
 
     verdict: verdict on the flight with the setup's own parameters.
     should_abort: called throughout the flights; once it returns True, they are aborted with TrialAborted.
@@ -239,7 +239,7 @@ CROSS_TRACK_ERROR_FRACTION = 0.1
 
 
 def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
-    """Return True if each failed finding passes in a trial, with the margin that simulation errors need.
+    """Return True if the margins of all formerly failed findings allow for simulation errors in a trial.
 
     trial_findings: findings of a flight with another parameter value.
     failed_findings: findings of the flight that failed.

@@ -74,7 +74,7 @@ def never_abort() -> bool:
 
 @dataclass(eq=False)
 class Trial:
-    """A setup that is judged and flown when a verdict is first requested, and only once.
+    """A setup that is judged, and flown if needed, only once: when a verdict is first requested.
 
     should_abort: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
     """
@@ -90,7 +90,7 @@ class Trial:
 
     @cached_property
     def geometry_verdict(self) -> Verdict:
-        """Verdict without a flight."""
+        """Verdict by geometry, without a flight."""
         return judge_geometry(self.setup, self.requirements)
 
     @cached_property
@@ -111,12 +111,12 @@ class Trial:
 
     @cached_property
     def flight_verdict(self) -> Verdict:
-        """Verdict on the flight."""
+        """Verdict on the flight, which is flown for it."""
         return judge_flight(self.setup, *self.flight, requirements=self.requirements)
 
 
 def max_explaining_flights(setup: FlightSetup) -> int:
-    """Return the number of flights, reference and trial flights, that may explain a setup's verdict.
+    """Return how many flights, reference and trial flights together, may be flown to explain a setup's verdict.
 
     >>> from logs.recording.example_log import example_log
     >>> max_explaining_flights(example_log().setup) > 100
@@ -180,7 +180,7 @@ def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
 
 
 def _worst_findings(verdict: Verdict) -> dict[tuple[str, str, int | None, str], Finding]:
-    """Return the worst finding of each rule at each place of a verdict."""
+    """Return the worst finding of each rule at each place of a verdict, by `finding_key`."""
     worst_by_key: dict[tuple[str, str, int | None, str], Finding] = {}
     for finding in sorted(verdict.findings, key=worst_first_key):
         worst_by_key.setdefault(finding_key(finding), finding)
@@ -193,7 +193,7 @@ def _is_undecided(finding: Finding) -> bool:
 
 
 def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
-    """Return the findings that fail or are undecided only after a change, each with the old finding.
+    """Return the findings that fail or are undecided after a change but not before, each as (old finding, finding).
 
     The old finding is None if there was none.  A finding that passed before and is not judged after the change is
     included.
@@ -216,8 +216,9 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
 
 
 def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
-    """Return the findings that a change makes worse: they fail, or are no longer decided or judged.
+    """Return the findings that a change makes worse: they newly fail, or are no longer decided or judged.
 
+    old_verdict, new_verdict: verdicts before and after the change.
     A finding that was not judged before, because the flight ended early, is left out.
     """
     has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
@@ -230,8 +231,9 @@ def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Findin
 
 
 def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
-    """Return the findings of a changed mission that the verdict before the change does not name.
+    """Return the failed and undecided findings after a change that the change does not make worse.
 
+    old_verdict, new_verdict: verdicts before and after the change.
     They fail or are undecided after the change.  Before it, they were not judged because the flight ended early, or
     they failed and are now only undecided.
     """
@@ -244,7 +246,10 @@ def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[Rema
 
 
 def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a finding does not fail after a change, and the change makes no other finding fail."""
+    """Return True if a finding does not fail after a change, and no finding newly fails.
+
+    old_verdict, new_verdict: verdicts before and after the change.
+    """
     has_new_failures = any(added.ok is False for added in worsened_findings(old_verdict, new_verdict))
     return not has_new_failures and finding_key(finding) not in map(finding_key, new_verdict.failed)
 
@@ -252,6 +257,7 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
     """Return True if a change makes a finding pass or disappear, and makes no other finding worse.
 
+    old_verdict, new_verdict: verdicts before and after the change.
     A slope passes only if the altitude error on its leg becomes clearly smaller.
     """
     new_finding = _worst_findings(new_verdict).get(finding_key(finding))
@@ -279,7 +285,7 @@ class PassedTrial:
 
 
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
-    """Return the suggestions that passed, grouped by finding, the smallest moves of items first.
+    """Return the suggestions that passed, grouped by finding, those with the smallest moves of items first.
 
     A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller one passed, and is stated first otherwise.
     """
@@ -360,7 +366,7 @@ class SuggestionTrials:
     def find_passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second and so on; return those that pass.
 
-        A suggestion is left out if a part of its changes passes by itself. Its moves are the fewest that are enough.
+        A suggestion is left out if some of its changes pass without the others.  It has only as many moves as it needs.
         """
         # The failed findings with suggestions, the worst of each rule first, the most urgent rules first; none if the
         # mission has too many legs or too many such findings.
@@ -393,7 +399,7 @@ class SuggestionTrials:
         ]
 
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
-        """Try a suggestion of a finding, enlarged if necessary; return the passed trial, or None.
+        """Try a suggestion of a finding, enlarged if necessary; return the trial that passed, or None.
 
         number: index of the suggestion among those of the finding.
         """
@@ -402,7 +408,10 @@ class SuggestionTrials:
     def _first_passing(
         self, finding: Finding, candidates: Iterator[tuple[Suggestion, Trial]], max_count: int
     ) -> PassedTrial | None:
-        """Return the first of at most `max_count` candidates whose trial passes, or None."""
+        """Return the first candidate whose trial passes, as a passed trial; None if none passes.
+
+        candidates: suggestions with their trials, of which at most `max_count` are tried.
+        """
         passed_candidate = first_that_passes(
             islice(candidates, max_count),
             lambda candidate: (
@@ -423,7 +432,10 @@ class SuggestionTrials:
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
 
     def _parts(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
-        """Yield the parts of a suggestion's moves, the smallest first, each with its trial."""
+        """Yield suggestions with only a part of a suggestion's moves, the fewest moves first, each with its trial.
+
+        Nothing is yielded for fewer than two moves, and for changes of other kinds than `_PART_KINDS`.
+        """
         moves, items = _item_moves(suggestion), self.judged.setup.route.items.tolist()
         if len(moves) < 2 or not {change.what for change in suggestion} <= _PART_KINDS:
             return
@@ -535,7 +547,7 @@ class SuggestionTrials:
         return with_value(least_change([*values, largest_value], passes) or largest_value)
 
     def _trial(self, finding: Finding, suggestion: Suggestion) -> Trial:
-        """Return the trial of a suggestion, the same one for equal missions and setups.
+        """Return the trial of a suggestion; suggestions that result in the same flight share a trial.
 
         Raises MissionError if the suggestion cannot be applied, and TrialAborted.
         """
@@ -592,7 +604,7 @@ def _has_margin(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> b
 
 
 def _zone_shortfall(finding: Finding, verdict: Verdict) -> float:
-    """Return the distance by which a path passes the zone of a finding too closely, m.
+    """Return by how much a path is closer to the zone of a finding than the navigation error, m.
 
     Returns 0 if no other finding of the verdict names this zone as the nearest zone.
     """
@@ -621,9 +633,9 @@ def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, su
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
-    """Return a suggestion, increased by what the mission still needs after it; None if no increase is known.
+    """Return a suggestion enlarged by what the mission still needs after it; None if no enlargement is known.
 
-    If the finding still does not pass, the increase is what this finding needs. Otherwise it is what the other legs
+    If the finding still does not pass, the enlargement is what this finding needs. Otherwise it is what the other legs
     need for the same rule.
 
     verdict: verdict on the mission with the suggestion applied.
@@ -655,7 +667,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
-    """Enlarge a suggestion by what an open finding still needs; None if it needs another kind of change."""
+    """Return a suggestion enlarged by what an open finding still needs; None if it needs another kind of change."""
     kinds = {change.what for change in suggestion}
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:
@@ -672,7 +684,7 @@ def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggest
 
 
 def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
-    """Merge the steps still needed into the steps of a suggestion.
+    """Return the steps of a suggestion, merged with the steps that are still needed.
 
     If a place already has a step of the same kind, the needed step is enlarged and added to it.
     """
@@ -692,7 +704,7 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
 
 
 def _merge_energy_changes(change: Change, needed_change: Change) -> Change:
-    """Combine two successive changes of the energy carried, or of the duration, into one change.
+    """Return one change that equals two successive changes of the energy carried, or of the duration.
 
     >>> from logs.verdict.places import FLIGHT
     >>> battery, duration = Change("battery", FLIGHT, None, 1.5, "1"), Change("duration", FLIGHT, None, 40.0, "%")

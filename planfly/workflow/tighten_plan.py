@@ -62,7 +62,7 @@ class Tightening:
 
 
 def tightening_text(change: Tightening) -> str:
-    """Describe one tightening, as in ``rounds.json`` and on the terminal.
+    """Return a text on one tightening, as in ``rounds.json`` and on the terminal.
 
     >>> tightening_text(Tightening("min_clearance_m", 60.0, 72.5))
     'limits.min_clearance_m: 60 to 72.5'
@@ -80,8 +80,9 @@ def tightening_text(change: Tightening) -> str:
 
 
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
-    """Return the scenario for the next round of planning, and the list of its changes.
+    """Return the scenario for the next round of planning, tightened after failures, and the list of its changes.
 
+    verdict: verdict on the flight of the last round.
     If nothing can be tightened, the scenario is returned unchanged and the list is empty.
     """
     spec = copy.deepcopy(scenario.to_json())
@@ -123,7 +124,7 @@ def _limits_table(spec: Spec) -> Spec:
 
 
 def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
-    """Tighten the climb and descent limits in `spec` if slopes failed.
+    """Tighten the climb and descent limits in `spec` if slopes failed; return the changes.
 
     The new limit is less than the flattest failed slope.
 
@@ -156,7 +157,7 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 
 
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Tighten the turns in `spec` if turns or corners failed.
+    """Tighten the turns in `spec` if turns, waypoints or the corridor failed; return the changes.
 
     A limit that the scenario states is replaced by the limit of the aircraft.  If the limit is already the aircraft's,
     the bank limit is lowered, but not below `MIN_BANK_DEG`.
@@ -177,7 +178,10 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
 
 
 def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
-    """Enlarge the kill radii in `spec` of the missiles that the flight came too close to, unlike the plan."""
+    """Enlarge the kill radii in `spec` of missiles that the flight, but not the plan, came too close to.
+
+    Return the changes.  Failed findings without a nearest missile are ignored.
+    """
     changes = []
     for finding in failed_findings:
         if finding.planned:
@@ -204,9 +208,9 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds until a round is flyable.
+    """Plan and fly in rounds until a round is flyable, no limit can be tightened, or `max_rounds` is reached.
 
-    Each round tightens the limits that the last flight violated.
+    Each further round tightens the limits that the last flight violated.
 
     max_rounds: maximum number of rounds after the first.
     fly_round: function that plans in a scenario and flies; it returns the verdict, and True if the plan was flown.
@@ -239,6 +243,8 @@ def refine(
 def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes: list[Tightening]) -> str:
     """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end.
 
+    verdict, was_flown: verdict on the round's plan, and True if the plan was flown.
+    is_last: True if no further round is allowed.
     changes: limits that were tightened after the round.
     """
     if verdict.flyable:

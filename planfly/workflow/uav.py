@@ -138,7 +138,7 @@ def scenario_aircraft(scenario: Scenario) -> Aircraft:
 
 
 def carried_energy(scenario: Scenario, aircraft: Aircraft) -> float:
-    """Return the energy that an aircraft carries in a scenario, Wh."""
+    """Return the energy that an aircraft carries, Wh: the scenario's battery_wh, or else the aircraft's own battery."""
     stated_energy = scenario.flight.battery_wh
     return aircraft.battery_energy / 3600.0 if stated_energy is None else stated_energy
 
@@ -163,10 +163,7 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 
 def with_tightened_limits(uav: Uav, scenario: Scenario) -> Uav:
-    """Return the UAV with the limits of a tightened scenario.
-
-    Envelope, airspeed and tracking error are kept.
-    """
+    """Return the UAV with the limits of a tightened scenario; envelope, airspeed and tracking error are kept."""
     old_limits = uav.limits
     limits = make_limits(scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
     return replace(uav, limits=replace(limits, tracking=old_limits.tracking))

@@ -1,1 +1,1 @@
-"""Estimation of the probability of a flyable flight from a number of flights."""
+"""Statistics of campaigns: the probability of a flyable flight, and the strongest wind that keeps a probability."""

@@ -50,7 +50,10 @@ _MIN_PROBABILITY = 1e-300
 
 
 class BinaryLink(Protocol):
-    """Link function; all methods take predictors in an array of any shape and return the same shape."""
+    """Link function from the linear predictor of a flight to the probability that the flight fails.
+
+    All methods take predictors in an array of any shape and return arrays of the same shape.
+    """
 
     def log_cdf(self, x: Floats) -> Floats:
         """Return the logarithm of the probability of failure at the linear predictor x."""
@@ -157,7 +160,7 @@ class _ComplementaryLogLog:
         return np.exp(self.log_survival(x))
 
     def density(self, x: Floats) -> Floats:
-        """Return the derivative of the probability of failure."""
+        """Return the derivative of the probability of failure by the linear predictor x."""
         return np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
@@ -298,7 +301,7 @@ class Outcomes:
     """Outcomes of n flights for one failure mode.
 
     terms: (n, 2 + d) terms of each flight: one, the wind relative to some origin, and the draws.
-    failed: (n,).
+    failed: (n,) True for each flight that failed in this mode.
     margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for unknown or failed.
     given_passed: True to condition on a pass, so that only the margin is informative.
     """
@@ -310,25 +313,22 @@ class Outcomes:
 
     @property
     def marginal(self) -> Bools:
-        """Mask (n,): True for flights that passed with a known margin below the rule's scale."""
+        """Mask (n,): True for each flight that passed with a known margin below the rule's scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
     def as_pass_or_fail(self) -> "Outcomes":
-        """Return the outcomes reduced to pass or fail."""
+        """Return the outcomes of all flights without their margins."""
         return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
     def margins_given_pass(self) -> "Outcomes":
-        """Return the outcomes of the passed flights with a known margin, conditional on having passed.
-
-        All other flights have a margin of 0, and are left out.
-        """
+        """Return only the passed flights with a known margin, conditional on having passed."""
         has_margin = self.margin > 0.0
         return Outcomes(self.terms[has_margin], self.failed[has_margin], self.margin[has_margin], given_passed=True)
 
 
 @dataclass(frozen=True)
 class RegressionFit:
-    """Posterior of a regression.
+    """Posterior of the coefficients of a regression, fitted to the outcomes of flights.
 
     mean, covariance: mean (2 + d,) and covariance (2 + d, 2 + d) of the terms' coefficients, from a normal
         approximation about the mode.
@@ -352,9 +352,9 @@ class RegressionFit:
 
 
 def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionFit | None = None) -> RegressionFit:
-    """Fit the regression of flight outcomes, and return the most probable fit.
+    """Fit the regression of flight outcomes, and return the fit with the most evidence.
 
-    One fit is made for each prior of the coefficients of the draws.
+    One fit is made for each prior of the draws' coefficients, and from each start point.
 
     link: link function between the predictor and the probability of failure.
     nearby_fit: a fit of the same coefficients, whose mode is used as an additional start point, because a posterior
@@ -379,7 +379,7 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionF
 
 
 class _Posterior:
-    """Posterior density of the coefficients of a regression, which is evaluated at points.
+    """Posterior density of the coefficients of a regression, as a function of points.
 
     A point (k,) holds the constant, the logarithm of the wind's coefficient, the coefficients of the draws, and, if any
     margin is known, the margin's coefficient.

@@ -27,7 +27,7 @@ class Tally(NamedTuple):
     """Number of flights with each outcome.
 
     lost: flights that could not be simulated.
-    undecided: flights that are not judged in full.
+    undecided: flights without a failure in which some rule is not judged, so that they are not known to be flyable.
     """
 
     flyable: int
@@ -52,9 +52,9 @@ class Tally(NamedTuple):
 
 
 def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return the exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934).
+    """Return the exact two-sided interval of a success probability, by Clopper and Pearson (Biometrika 26, 1934).
 
-    Its coverage is at least ``confidence``.
+    Its coverage is at least ``confidence``.  It is 0 to 1 without trials.
 
     >>> [round(bound, 4) for bound in clopper_pearson(299, 299)]
     [0.9877, 1.0]
@@ -63,9 +63,9 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return Wilson's score interval (JASA 22, 1927), for use in pictures.
+    """Return Wilson's two-sided score interval of a success probability (JASA 22, 1927), for use in pictures.
 
-    Its mean coverage is near ``confidence``.
+    Its mean coverage is near ``confidence``.  It is 0 to 1 without trials.
 
     >>> [round(bound, 4) for bound in wilson(8, 10)]
     [0.4902, 0.9433]
@@ -76,7 +76,7 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
 def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
     """Return Clopper and Pearson's one-sided lower bound of the probability of success; 0 without flights.
 
-    Lost and undecided flights count as failures.
+    Lost and undecided flights are treated as failures.
 
     299 flights without a failure give P >= 0.99 at 95 %.
 
@@ -90,7 +90,9 @@ def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
 
 
 def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
-    """Return Clopper and Pearson's one-sided upper bound of the probability of success.
+    """Return Clopper and Pearson's one-sided upper bound of the probability of success; 1 without flights.
+
+    Lost and undecided flights are treated as successes.
 
     >>> round(upper_bound(Tally(0, 10)), 4)
     0.2589
@@ -124,11 +126,11 @@ def _binomial_interval(successes: int, trials: int, confidence: float, method: s
 # "Statistical methods related to the law of the iterated logarithm", Ann. Math. Stat. 41, 1970; Ville's inequality).
 # Stopping as soon as the bound suffices is therefore valid, unlike with an interval for a fixed number of flights.
 #
-# The mixture has two parts.  One, of nearly all the weight, is so near to 1 that without a failure a target is reached
-# after as many flights as with a fixed number (299 for 0.99); the other, Jeffreys' Beta(1/2, 1/2), covers probabilities
-# far from the target.
+# The mixture has two components.  One, of nearly all the weight, is so near to 1 that without a failure a target is
+# reached after as many flights as with a fixed number (299 for 0.99); the other, Jeffreys' Beta(1/2, 1/2), covers
+# probabilities far from the target.
 
-# Weight of the part far from the target.
+# Weight of the component far from the target.
 _JEFFREYS_WEIGHT = 0.001
 # Evidence that the mixture loses if no flight fails, as a logarithm; it costs one more flight at P = 0.99.
 _MIXTURE_LOSS = 0.009
@@ -150,7 +152,7 @@ class StoppingBound:
 
     @property
     def min_flights(self) -> int:
-        """Number of flights without a failure that reach the target."""
+        """Smallest number of flights that prove the target if none of them fails."""
         return math.ceil((self._required_evidence + _MIXTURE_LOSS) / -math.log(self.target))
 
     @property
@@ -159,31 +161,29 @@ class StoppingBound:
         return -math.log1p(-self.confidence)
 
     @cached_property
-    def parts(self) -> tuple[tuple[float, float, float], ...]:
-        """Weight, a and b of each part of the mixture.
+    def components(self) -> tuple[tuple[float, float, float], ...]:
+        """Weight, a and b of the beta distribution of each mixture component.
 
-        The a of the first part is `min_flights`.  Its b is found by bisection: the largest value with which
+        The a of the first component is `min_flights`.  Its b is found by bisection: the largest value with which
         `min_flights` flights without a failure still reach the target.
         """
         scale, min_failures, max_failures = float(self.min_flights), 0.0, 1.0
         for _ in range(_BISECTIONS):
             failures = 0.5 * (min_failures + max_failures)
             evidence = _log_mixture(
-                self._mixture_parts(scale, failures), self.min_flights, 0
+                self._mixture_components(scale, failures), self.min_flights, 0
             ) - self.min_flights * math.log(self.target)
             min_failures, max_failures = (
                 (failures, max_failures) if evidence >= self._required_evidence else (min_failures, failures)
             )
         # Use slightly less than the solution, to cover rounding.
-        return self._mixture_parts(scale, 0.999 * min_failures)
+        return self._mixture_components(scale, 0.999 * min_failures)
 
     @staticmethod
-    def _mixture_parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
-        """Return the two parts of the mixture: a beta distribution near 1, and Jeffreys' prior.
+    def _mixture_components(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
+        """Return weight, a and b of the two mixture components: a beta distribution near 1, and Jeffreys' prior.
 
-        A part is weight, a and b.
-
-        scale, failures: a and b of the first part.
+        scale, failures: a and b of the first component.
         """
         return (1.0 - _JEFFREYS_WEIGHT, scale, max(failures, 1e-9)), (_JEFFREYS_WEIGHT, 0.5, 0.5)
 
@@ -196,7 +196,7 @@ class StoppingBound:
         successes, failures: numbers of flights.
         """
         likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
-        return _log_mixture(self.parts, successes, failures) - likelihood
+        return _log_mixture(self.components, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
         """Return True if the success probability is proven to be above p, or below p if `above` is False.
@@ -209,9 +209,11 @@ class StoppingBound:
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
 
     def interval(self, successes: int, failures: int) -> Interval:
-        """Return the interval of the probabilities p that the flights do not exclude.
+        """Return the interval of the success probabilities p that the flights do not exclude.
 
-        It contains the fraction of successes.
+        It contains the fraction of successes, and is 0 to 1 without flights.
+
+        successes, failures: numbers of flights.
         """
         trials = successes + failures
         if not trials:
@@ -222,9 +224,9 @@ class StoppingBound:
         return Interval(lower, upper)
 
     def _find_edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
-        """Find by bisection the edge between the excluded and the other probabilities p.
+        """Find by bisection the probability p at which exclusion ends; return the excluded side.
 
-        excluded, included: an excluded value, and a value that is not excluded.
+        excluded, included: an excluded p, and a p that is not excluded.
         successes, failures: numbers of flights.
         """
         for _ in range(_BISECTIONS):
@@ -252,15 +254,15 @@ def _times_log(count: int, p: float) -> float:
     return count * math.log(p) if p > 0.0 else -math.inf
 
 
-def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, failures: int) -> float:
-    """Return the log-likelihood of outcomes under a mixture of beta distributions.
+def _log_mixture(components: tuple[tuple[float, float, float], ...], successes: int, failures: int) -> float:
+    """Return the log-likelihood of a sequence of outcomes if the success probability has a mixture of beta priors.
 
-    parts: weight, a and b of each distribution.
+    components: weight, a and b of each distribution.
     successes, failures: numbers of flights.
     """
     from scipy.special import betaln
 
-    terms = [math.log(w) + float(betaln(successes + a, failures + b) - betaln(a, b)) for w, a, b in parts]
+    terms = [math.log(w) + float(betaln(successes + a, failures + b) - betaln(a, b)) for w, a, b in components]
     return float(np.logaddexp.reduce(terms))
 
 
@@ -278,8 +280,8 @@ class Goal:
 
     target: the probability to reach; None to estimate the probability only.
     stops: True to stop flying as soon as the answer is known (`--prove`); otherwise the number of flights is fixed.
-    flights: fixed number of flights, or the maximum number if it stops.
-    changed: True if the fixed number was changed after some of the flights.
+    flights: fixed number of flights, or the maximum number if `stops`.
+    changed: True if a resumed campaign changed the number of flights or `stops`.
     """
 
     target: float | None
@@ -290,7 +292,7 @@ class Goal:
 
     @property
     def bound_method(self) -> str:
-        """Method by which the bounds of the probability are computed, with its condition."""
+        """Text for reports: method of the probability's bounds, and the condition under which they are valid."""
         if self.stops:
             return "beta-binomial mixture, valid whenever the flights are stopped"
         if self.changed:
@@ -303,8 +305,9 @@ class Goal:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of the probability.
+    """Estimate of the probability of a flyable flight.
 
+    tally: the flights from which it is estimated.
     lower, upper: bounds of the probability, each with the goal's confidence.  If the goal stops the campaign, both
     bounds hold together at every number of flights.
     interval: two-sided interval, with the goal's confidence.
@@ -318,7 +321,7 @@ class Estimate:
 
 
 class Estimator:
-    """Estimator of one goal during a campaign."""
+    """Estimator of the probability of a flyable flight, for one goal."""
 
     def __init__(self, goal: Goal) -> None:
         self._goal = goal
@@ -326,11 +329,14 @@ class Estimator:
 
     @property
     def min_flights(self) -> int:
-        """Smallest number of flights that may decide the goal."""
+        """Smallest number of flights that can prove the target, or the fixed number of flights."""
         return self._bound.min_flights if self._bound is not None else self._goal.flights
 
     def decides(self, tally: Tally) -> bool:
-        """Return True if a tally proves or disproves the target; always False for a fixed number of flights."""
+        """Return True if a tally proves or disproves the target, so that the campaign stops.
+
+        Always False for a fixed number of flights, and without a target.
+        """
         target, bound = self._goal.target, self._bound
         if bound is None or target is None:
             return False
@@ -420,10 +426,10 @@ def first_order_index(x: Floats, y: Floats) -> float:
     total = float(((y - y.mean()) ** 2).sum()) if count else 0.0
     if count < MIN_FLIGHTS_FOR_INDEX or total <= 1e-12 * count or np.ptp(x) == 0.0:
         return 0.0
-    parts = _split_into_groups(x, y)
-    between_variance = sum(part.size * float(part.mean() - y.mean()) ** 2 for part in parts)
-    within_variance = (total - between_variance) / (count - len(parts))
-    return float(np.clip((between_variance - (len(parts) - 1) * within_variance) / total, 0.0, 1.0))
+    groups = _split_into_groups(x, y)
+    between_variance = sum(group.size * float(group.mean() - y.mean()) ** 2 for group in groups)
+    within_variance = (total - between_variance) / (count - len(groups))
+    return float(np.clip((between_variance - (len(groups) - 1) * within_variance) / total, 0.0, 1.0))
 
 
 def _split_into_groups(x: Floats, y: Floats) -> list[Floats]:
@@ -432,8 +438,8 @@ def _split_into_groups(x: Floats, y: Floats) -> list[Floats]:
     return np.array_split(y[np.argsort(x, kind="stable")], groups)
 
 
-def chance_probability(x: Floats, y: Floats) -> float:
-    """Return the probability that y depends on x by chance at least as much as these values do, 0 to 1.
+def dependence_p_value(x: Floats, y: Floats) -> float:
+    """Return the p-value of a dependence of y on x: the probability of one at least as strong by chance, 0 to 1.
 
     It is twice the smaller p-value of two tests.  One is the test of Kruskal and Wallis on the groups of
     `first_order_index` (Journal of the American Statistical Association 47, 1952).  The other is Spearman's test, which
@@ -443,7 +449,7 @@ def chance_probability(x: Floats, y: Floats) -> float:
 
     >>> random = np.random.default_rng(1)
     >>> x = random.random((40, 2))
-    >>> [chance_probability(x[:, k], x[:, 0] + 0.5 * random.random(40)) < 0.001 for k in range(2)]
+    >>> [dependence_p_value(x[:, k], x[:, 0] + 0.5 * random.random(40)) < 0.001 for k in range(2)]
     [True, False]
     """
     from scipy.stats import kruskal, spearmanr
@@ -455,7 +461,7 @@ def chance_probability(x: Floats, y: Floats) -> float:
 
 
 def rank_slope(x: Floats, y: Floats) -> float:
-    """Return Spearman's rank correlation of x and y, -1 to 1; 0 if either does not vary.
+    """Return Spearman's rank correlation of x and y, -1 to 1; 0 for fewer than three values, or if x or y is constant.
 
     >>> rank_slope(np.arange(5.0), -np.arange(5.0) ** 3)
     -1.0

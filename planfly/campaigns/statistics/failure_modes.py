@@ -42,7 +42,7 @@ _GRID_ABOVE_MPS = 10.0
 
 @dataclass(frozen=True)
 class FailureWindDistributions:
-    """Distributions of the wind at which a flight fails, on a grid of parameters.
+    """Possible distributions of the wind above which a flight fails, one for each point of a grid of parameters.
 
     location, scale: parameters of the n distributions, m/s, (n,); mean and standard deviation of a normal distribution.
     normal_count: number of normal distributions, which come first; the others are Gumbel distributions with the same
@@ -67,9 +67,9 @@ class FailureWindDistributions:
         return cls(np.concatenate((mean, location)), np.concatenate((deviation, scale)), mean.size)
 
     def log_probabilities(self, speed: float) -> tuple[Floats, Floats]:
-        """Return log-probabilities that a flight fails, and that it succeeds, in a wind; two arrays (n,).
+        """Return, for each distribution, the log-probability that a flight fails in a wind, and that it succeeds.
 
-        There is one value for each distribution.
+        Both are arrays (n,).
 
         speed: wind speed, m/s.
         """
@@ -93,8 +93,9 @@ class FailureWindDistributions:
     def posterior_quantiles(
         self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats
     ) -> Floats:
-        """Return quantiles of the unknown wind in which a fraction of the flights fails, m/s, (k,).
+        """Return posterior quantiles of the wind in which a fraction of the flights fails, m/s, (k,).
 
+        fraction: the fraction of the flights that fail, above 0 and below 1.
         speeds: wind of each flight, m/s, (m,).
         flyable: True for a flyable flight, (m,).
         probabilities: probabilities of the quantiles, 0 to 1, (k,).
@@ -127,8 +128,9 @@ class FailureWindDistributions:
 
 @dataclass(frozen=True, slots=True)
 class FailureMode:
-    """One failure mode.
+    """Failure mode, such as the slope of leg 12, as a fitted regression.
 
+    link: link function between the predictor and the probability of failure.
     mean, covariance: mean (2 + d,) and covariance (2 + d, 2 + d) of the coefficients of the mode's terms.
     sample: function that returns s equally likely sets of coefficients, (s, 2 + d).
     log_evidence: logarithm of the evidence of the outcomes, for this link.
@@ -176,9 +178,9 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
 
 
 def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
-    """Return a failure mode with the coefficients of a fit.
+    """Return the failure mode of a fit.
 
-    log_evidence: evidence of failures and margins.
+    log_evidence: logarithm of the evidence of failures and margins together, which may differ from the fit's.
     """
     return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.margin_coefficient)
 
@@ -248,9 +250,7 @@ def fit_modes(
 
 
 def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats:
-    """Return the probability that each flight fails in any mode, (n,).
-
-    The probability is computed with the mean coefficients of the modes.
+    """Return each flight's probability of failing in at least one mode, (n,), from the modes' mean coefficients.
 
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
@@ -323,11 +323,12 @@ def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) 
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
-    """Return the derivatives of the boundary with respect to each mode's coefficients.
+    """Return the derivatives of the boundary's wind speed by each mode's coefficients, one array (2 + d,) per mode.
 
-    The derivatives are arrays (2 + d,), m/s, and follow from the implicit function theorem.
+    They are in m/s per unit of the coefficient, and follow from the implicit function theorem.
 
-    draws: (m, d).
+    modes: fitted failure modes for one link.
+    draws: drawn quantities, (m, d).
     speed: wind speed at the boundary, m/s.
     """
     failing = failure_fraction(modes, draws, speed)

@@ -29,6 +29,7 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 
     only_first, only_second: number of pairs in which only the first trial, or only the second, succeeded.
     pairs: number of all pairs, at least 1.
+    confidence: confidence of the interval.
 
     >>> difference = paired_difference(2, 12, 50)
     >>> difference.value, round(difference.p_value, 4)
@@ -69,12 +70,13 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 def independent_difference(
     first: tuple[int, int], second: tuple[int, int], confidence: float = 0.95
 ) -> ProportionDifference:
-    """Return the difference of the probabilities of success of two independent samples.
+    """Return the difference of two success probabilities, second minus first, from independent samples.
 
     The interval is Newcombe's hybrid of two score intervals (Statistics in Medicine 17, 1998, method 10).  The p-value
     is from Fisher's exact test.
 
-    first, second: number of successes and of trials, at least 1.
+    first, second: number of successes, and number of trials, at least 1.
+    confidence: confidence of the interval.
 
     >>> low, high = independent_difference((48, 80), (56, 70)).interval
     >>> round(low, 4), round(high, 4)

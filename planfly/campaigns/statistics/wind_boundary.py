@@ -57,13 +57,13 @@ def boundary_quantiles(
     max_speed: float,
     probabilities: Sequence[float],
 ) -> list[float]:
-    """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``.
+    """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``, in the order of `probabilities`.
 
-    Each posterior sample of the coefficients has one boundary.  The quantiles are those of these boundaries, each with
-    the weight of its link.
+    Each posterior sample of the coefficients gives one boundary, with the weight of its link; the quantiles are taken
+    over these boundaries.
 
     fits: failure modes fitted with each link, and the link's weight.
-    draws: possible draws, (m, d); the first few of them are spread as evenly as all.
+    draws: possible draws, (m, d); any first few of them must be spread evenly, too.
     failing_fraction: fraction of flights that fail at the boundary, above 0 and below 1.
     probabilities: probability of each quantile, 0 to 1.
 
@@ -147,9 +147,7 @@ class _FailureFractions:
 
 @dataclass
 class DrawnNumbers:
-    """Draws of the quantities that vary between flights, other than the wind.
-
-    Draws are in standard deviations from the means.
+    """Draws of the quantities that vary between flights, other than the wind, in standard deviations from the means.
 
     population: (m, d) evenly spread possible draws; each represents the same share of flights.
     draw: function of start and stop index that returns the draws of these flights, (stop - start, d).
@@ -171,11 +169,11 @@ class DrawnNumbers:
 
 @dataclass(frozen=True)
 class WindBoundary:
-    """Largest wind with the target probability, m/s.
+    """Posterior of the boundary: the largest wind in which the mission is flyable with the target probability, m/s.
 
     estimate: median of the posterior.
     low, high: two-sided interval of the posterior.
-    is_beyond_search: True if the estimate is beyond the largest wind of the search.
+    is_beyond_search: True if the boundary is not below the largest wind of the search, to which `estimate` is limited.
     """
 
     estimate: float
@@ -191,10 +189,10 @@ class WindBoundary:
 
 @dataclass(frozen=True)
 class FailureFit(WeightedModes):
-    """Fit of the flights of a direction for one link.
+    """Failure modes fitted for one link to the flights of a direction, and their boundary.
 
     speed: the boundary, m/s, at most the largest wind of the search.
-    slopes: derivatives of the boundary by each mode's coefficients.
+    slopes: derivatives of the boundary by each mode's coefficients, as from `boundary_slopes`.
     """
 
     speed: float
@@ -202,7 +200,7 @@ class FailureFit(WeightedModes):
 
 
 class Direction:
-    """Flights in wind from one direction.
+    """Flights in winds from one direction, from which the direction's boundary is estimated.
 
     max_speed: largest wind of the search, m/s.
     target: required probability of success, above 0 and below 1.
@@ -211,7 +209,8 @@ class Direction:
     speeds: wind of each flight, m/s.
     draws: index of each flight's draw.
     failed_modes: failure modes of each flight.
-    margin: modes that each flight passed narrowly, with the margin as a fraction of a scale, 0 to 1; None if unknown.
+    margin: for each flight, the modes that it passed narrowly, with the margin as a fraction of a scale, 0 to 1; None
+        if unknown.
     """
 
     def __init__(self, max_speed: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
@@ -268,7 +267,7 @@ class Direction:
         return self._fits[1]
 
     def boundary(self) -> WindBoundary:
-        """Return the largest wind with the target probability: estimate and interval, m/s.
+        """Return the estimate and the interval of the boundary, limited to 0 to `max_speed`.
 
         >>> numbers = DrawnNumbers(np.zeros((8, 0)), lambda start, stop: np.zeros((stop - start, 0)))
         >>> direction = Direction(20.0, 0.99, numbers)
@@ -299,7 +298,10 @@ class Direction:
 
 
 def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, min_flights: int) -> bool:
-    """Return True if a direction has too few flights, or an interval wider than twice the accuracy.
+    """Return True if a direction has too few flights, or a boundary whose interval is too wide.
+
+    flights: number of flights of the direction; at least `min_flights` are needed.
+    accuracy: largest half-width of the interval, m/s.
 
     >>> needs_more_flights(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
     False
@@ -337,9 +339,9 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Choose the next `count` flights of a direction: wind, m/s, and index of the draw of each.
+    """Choose the next `count` flights of a direction; return wind, m/s, and index of the draw of each.
 
-    As long as all flights have the same outcome, the wind is chosen by bisection.  After that, the flights are chosen
+    While all flights have the same outcome, the wind is chosen by bisection.  After that, those flights are chosen
     that are expected to reduce the variance of the boundary most.
     """
     if direction.all_flyable or direction.all_failed:
@@ -418,7 +420,7 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return the variance between the fits that each flight is expected to remove, (m/s)^2, (n,).
+    """Return by how much each flight is expected to reduce the boundary's variance between the fits, (m/s)^2, (n,).
 
     The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction is the
     variance, over the two outcomes of a flight, of the mean boundary given the outcome.
@@ -435,16 +437,16 @@ def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats
 
 
 class _ExpectedPosterior:
-    """Expected posterior of a fit after the chosen flights."""
+    """Posterior that a fit is expected to have after the flights chosen so far."""
 
     def __init__(self, fit: FailureFit) -> None:
         self._fit = fit
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return the variance of the boundary that each flight is expected to remove, (m/s)^2, (n,).
+        """Return by how much each flight is expected to reduce the boundary's variance within this fit, (m/s)^2, (n,).
 
-        Only the variance within the fit is considered; the reduction is multiplied by the weight of the fit.
+        The reduction is multiplied by the weight of the fit.
 
         terms: regressors of each flight, (n, 2 + d).
         """
@@ -468,9 +470,9 @@ class _ExpectedPosterior:
             )
 
     def _mode_information(self, terms: Floats) -> Iterator[Floats]:
-        """Yield for each mode the Fisher information of flights, (n,).
+        """Yield for each mode the expected Fisher information of each flight about the mode's predictor, (n,).
 
-        A failure in an earlier mode leaves no information on a later mode.
+        A flight that fails in an earlier mode has no information about a later mode.
 
         terms: regressors of each flight, (n, 2 + d).
         """

@@ -1,4 +1,4 @@
-// Drawing in SVG, and how lengths become pixels.
+// Draw SVG elements, and convert lengths to pixels.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -25,7 +25,7 @@ export function clear(parent) {
   return parent;
 }
 
-// A map of equal scales, north up: `scale` pixels a metre, east and north at the left upper corner.
+// Map view with equal scales, north up: `scale` pixels per metre, `east` and `north` of the upper left corner, m.
 export class View {
   constructor() {
     Object.assign(this, { east: 0, north: 0, scale: 0.05, width: 1, height: 1 });
@@ -58,7 +58,7 @@ export class View {
   }
 }
 
-// Steps of 1, 2 or 5 times a power of ten, at most `parts` of them.
+// Return a step of 1, 2 or 5 times a power of ten that divides a span into at most `parts` steps.
 export function step(span, parts) {
   const raw = Math.max(span, 1e-9) / parts, power = 10 ** Math.floor(Math.log10(raw));
   return [1, 2, 5, 10].find((one) => one * power >= raw * (1 - 1e-9)) * power;
@@ -70,13 +70,13 @@ export function ticks(low, high, parts) {
   return found;
 }
 
-// A number as text; a dash for one that is not known.
+// Return a number as text; a dash if it is unknown.
 export function plain(value, digits = 0) {
   if (value === null || !Number.isFinite(value)) return "\u2013";
   return value.toFixed(digits).replace("-", "\u2212");
 }
 
-// The height of the ground on the grid that the server sent; NaN where it is not known.
+// Return the ground height on the grid that the server sent; NaN if it is unknown.
 export function groundAt(grid, east, north) {
   if (!grid) return NaN;
   const { rows, columns, heights } = grid;
@@ -89,14 +89,14 @@ export function groundAt(grid, east, north) {
   return low * (1 - y) + (heights[at + columns] * (1 - x) + heights[at + columns + 1] * x) * y;
 }
 
-// Names are written where none stands yet, beside the legs if there is room; important ones come first.
+// Place labels where no label is yet, away from the legs if there is room; important labels must be placed first.
 export class Labels {
-  // legs: [[x, y], [x, y]] of each, which names had better not cover.
+  // legs: both ends [[x, y], [x, y]] of each leg, which labels should not cover.
   constructor(legs = []) {
     this.taken = [];
     this.legs = legs;
   }
-  // The first of the places [x, y] that covers no name and no leg, or else no name; undefined without one.
+  // Return the first of the places [x, y] that covers no label and no leg, or else no label; undefined without one.
   take(places, width, height) {
     const boxes = places.map(([x, y]) => [x, y, x + width, y + height]);
     const free = boxes.filter((box) => !this.taken.some((one) => box[0] < one[2] && one[0] < box[2] && box[1] < one[3] && one[1] < box[3]));
@@ -107,7 +107,7 @@ export class Labels {
   block(x, y, half) { this.taken.push([x - half, y - half, x + half, y + half]); }
 }
 
-// True if a straight line enters a box (Liang and Barsky, 1984).
+// Return true if a straight line enters a box (Liang and Barsky, 1984).
 function crosses(box, from, to) {
   let first = 0, last = 1;
   for (const axis of [0, 1]) {

@@ -1,10 +1,10 @@
-// Mouse, touch, wheel and keys on the map and on the profile.
+// Handle mouse, touch, wheel and keys on the map and on the profile.
 
 import { plain } from "/axes.js";
 import { byWorst, heightWords, legStates } from "/map.js";
 
 const STEP = 10, FAR = 100, UP = 5;
-// Legs that are named where several lie over one another.
+// Maximum number of legs that are named where several lie over each other.
 const MOST_LEGS = 3;
 
 export class Hands {
@@ -33,7 +33,7 @@ export class Hands {
   }
 
   at(event, root) {
-    // While something is held the page does not move below the hand: to ask where it is has all laid out anew.
+    // During a drag the page does not move, so reuse the box: measuring it would lay out the whole page again.
     const held = this.drag || this.side, box = (held?.root === root && held.box) || root.getBoundingClientRect();
     if (held) Object.assign(held, { root, box });
     return [event.clientX - box.left, event.clientY - box.top];
@@ -105,7 +105,7 @@ export class Hands {
     app.hint(null);
   }
 
-  // A sheet has come: a drag goes on where it has the same items, and else ends.  Whether one goes on.
+  // A new mission has arrived: continue a drag if it has the same items, otherwise end the drag.  Returns true if one continues.
   onSheet(same, rev) {
     const held = [this.drag, this.side].filter((one) => one && one.rev !== undefined);
     if (same) for (const one of held) one.rev = rev;
@@ -159,12 +159,12 @@ export class Hands {
     app.hint([name, text, ...others.map((words) => words.filter(Boolean).join(": "))], x, y, model.states.legs[legs[0]][0]);
   }
 
-  // Numbers beside the pointer: heights, and what of its corner and legs is closest to its limit.
+  // Show numbers next to the pointer: heights, and the closest limits of the item's corner and legs.
   words(k, x, y, place) {
     this.said = [k, x, y, place];
     const { app } = this, model = app.model(), item = model.items.find((one) => one.k === k);
     if (!item) return;
-    // What is dragged over the ground may rise and fall with it: its height is that of the newest route.
+    // An item with a height above ground moves vertically with the terrain: take its height from the newest route.
     const passed = place ? model.of.indexOf(k) : -1, up = place?.up ?? (passed < 0 ? item.at[2] : model.route[passed][2]);
     const [east, north] = place ? [place.east, place.north] : item.at;
     const unseen = model.of.includes(k) || item.at[2] === null ? [] : ["not flown"];
@@ -175,7 +175,7 @@ export class Hands {
     app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, up)}`, ...(fault ? [fault] : unseen.concat(lines.slice(0, 3)))], x, y, fault ? "fail" : worst);
   }
 
-  // The numbers of a drag anew, when its verdict has come.
+  // Show the numbers of a drag again after its verdict has arrived.
   again() {
     if ((this.drag?.moved && this.drag.k !== undefined) || this.side?.moved) this.words(...this.said);
   }
@@ -248,7 +248,7 @@ export class Hands {
       }
       return app.hint(null);
     }
-    // All other keys are for the map and the profile: a key that is meant for a field changes no waypoint.
+    // All other keys are for the map and the profile; keys typed into a field must not change a waypoint.
     if (control || event.altKey || !app.model() || !event.target.closest?.("#map, #profile")) return undefined;
     return this.keyOnMap(event);
   }
@@ -290,7 +290,7 @@ export class Hands {
   }
 }
 
-// The name of a leg, and what is closest to its limit there.
+// Return the name of a leg, and its closest limit.
 function legWords(model, leg) {
   const [state, text] = model.states.legs[leg], to = model.items.find((one) => one.k === model.of[leg + 1]);
   return [to ? `leg ${leg} (to item ${to.seq})` : `leg ${leg}`, text || (state === "ok" ? "passes" : "")];

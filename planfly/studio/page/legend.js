@@ -1,4 +1,4 @@
-// What the lines of the map mean, and a compass with the wind.
+// Draw the legend of the map's lines, and a compass with the wind.
 
 import { clear, element, svg } from "/axes.js";
 
@@ -7,7 +7,7 @@ const LINES = [
   ["straight", "between waypoints"],
 ];
 
-// The lines that this world can show, each once.
+// Draw the lines that occur in this world, each once.
 export function drawLegend(box, world) {
   const kinds = new Set(world.zones.map((zone) => zone.kind));
   const shown = [
@@ -25,7 +25,7 @@ export function drawLegend(box, world) {
   }));
 }
 
-// The arrow points where the wind blows to.  north: degrees from the upward direction of the view to north, clockwise.
+// Draw a compass, whose arrow points where the wind blows to.  north: direction of north, degrees clockwise from up.
 export function drawCompass(box, { wind_speed: speed, wind_from: from, forecast }, north = 0) {
   const words = speed > 0 ? `wind ${speed.toFixed(1)} m/s from ${bearing(from)}` : "no wind", more = forecast ? "mean at the start" : "";
   const dial = svg("svg", { viewBox: "-32 -32 64 64", "aria-hidden": "true" });

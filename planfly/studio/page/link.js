@@ -1,4 +1,4 @@
-// The connection to the server: the token, the newest place of a drag, and a new connection when one is lost.
+// Connect to the server: send the token and the newest position of a drag, and reconnect after a lost connection.
 
 const REST = 150;
 const KEY = "planfly-studio-token";
@@ -12,7 +12,7 @@ function token() {
   return sessionStorage.getItem(KEY) || "";
 }
 
-// Numbers that the server takes: m, but for the seed.
+// Ranges of the numbers that the server accepts, m, except the seed.
 export const RANGES = { east: [-6e5, 6e5], north: [-6e5, 6e5], up: [-500, 9000], by: [-9000, 9000], seed: [0, 2 ** 31 - 1] };
 
 function bounded(message) {
@@ -24,7 +24,7 @@ function bounded(message) {
 }
 
 export class Link {
-  // handlers: by kind of message; "picture" and "heights" of the ground, "open" and "lost" of the connection.
+  // handlers: by kind of message, and "picture" and "heights" of the ground, "open" and "lost" of the connection.
   constructor(handlers) {
     this.handlers = handlers;
     this.token = token();
@@ -33,7 +33,7 @@ export class Link {
     this.tries = 0;
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", () => this.send({ kind: "look", dark: this.dark.matches }));
-    // An address with a new key, opened where the page is already, is no new page.
+    // An address with a new token in an open page only changes the hash, so reload the page.
     addEventListener("hashchange", () => location.hash.startsWith("#t=") && location.reload());
     this.connect();
   }
@@ -77,7 +77,7 @@ export class Link {
     if (message.kind === "preview") return this.previewed(message);
     const handler = this.handlers[message.kind];
     if (handler) handler(message);
-    // Of what kind the message before was: a work that has failed is stopped, then says why.
+    // Kind of the previous message: a failed task is first reported as stopped, and then with its fault.
     this.before = message.kind;
   }
 
@@ -89,11 +89,11 @@ export class Link {
     else this.handlers.heights({ ...head, heights: new Float32Array(body) });
   }
 
-  // A place that an item is dragged to is sent at once: the server judges the newest of those that have come meanwhile.
-  // The whole verdict is asked for when the hand rests.
+  // Send each position of a dragged item at once: the server judges only the newest position that has arrived.
+  // Request the verdict on the whole mission when the pointer rests.
   drag(place) {
     this.number += 1;
-    // What was asked and what is shown stands in the page, for whoever measures it.
+    // Store the requested and the shown number in the page, for measurements.
     document.documentElement.dataset.asked = this.number;
     this.place = { kind: "drag", ...place };
     clearTimeout(this.rest);
@@ -101,12 +101,12 @@ export class Link {
     this.send({ ...this.place, n: this.number });
   }
 
-  // An answer of an older sheet (stale) says nothing of what is shown.
+  // Ignore an answer on an older mission (stale).
   previewed(message) {
     if (this.place && !message.stale) this.handlers.preview(message);
   }
 
-  // The drag has ended, however it did.
+  // The drag has ended, in whatever way.
   settle() {
     clearTimeout(this.rest);
     this.place = null;

@@ -1,22 +1,22 @@
-// The map: ground, zones, threats, the route with the path that the autopilot flies, and the waypoints.
+// Draw the map: ground, zones, threats, the route with the path that the autopilot flies, and the waypoints.
 
 import { Labels, View, clear, groundAt, plain, step, svg } from "/axes.js";
 
 const DENSE = 80;
-// Closeness of a state that no limit is near to, which is sent as null.
+// Closeness of a state without a near limit, which is sent as null.
 const FAR = 1e9;
-// Legs of the straight line between the waypoints that are one shape: what is dragged has its own drawn anew.
+// Number of straight legs drawn as one shape; a drag redraws only the shapes of the dragged item.
 const CHUNK = 6;
-// Pixels that legend, compass and scale take at the lower edge.
+// Height of legend, compass and scale at the lower edge, pixels.
 const TOOLS = 76;
-// Pixels within which a leg is below the pointer, and within which two legs are as near to it.
+// Distance within which a leg is below the pointer, and difference within which two legs are equally close, pixels.
 const REACH = 9, SAME = 3;
 
 export class MapView {
   constructor(root) {
     this.root = root;
     this.view = new View();
-    // Ground, zones and threats are a picture of their own below, which a drag does not have painted anew.
+    // Ground, zones and threats are a separate picture below, which is not repainted during a drag.
     this.below = svg("svg", { class: "below", "aria-hidden": "true" });
     root.before(this.below);
     this.land = svg("g", { class: "world" }, this.below);
@@ -27,7 +27,7 @@ export class MapView {
     this.ways = svg("g", { class: "ways" }, this.world);
     this.straight = svg("g", {}, this.world);
     this.legs = svg("g", { class: "legs" }, this.world);
-    // The worst state is drawn last, so that a later lap does not hide a leg that fails in an earlier one.
+    // Draw the worst state last, so that a later lap does not hide a leg that fails in an earlier lap.
     this.layers = Object.fromEntries([...ORDER].reverse().map((state) => [state, svg("g", {}, this.legs)]));
     this.track = svg("path", { class: "track" }, this.world);
     this.names = svg("g", { class: "names", "aria-hidden": "true" }, root);
@@ -72,7 +72,7 @@ export class MapView {
     return undefined;
   }
 
-  // The mission as it is drawn: route, path of each leg, states, items.
+  // Draw a mission: route, path of each leg, states and items.
   show(model) {
     const fresh = !this.model || this.model.path.length !== model.path.length || this.model.items.length !== model.items.length;
     this.model = model;
@@ -83,7 +83,7 @@ export class MapView {
     this.layOut();
   }
 
-  // What a drag's verdict has changed, and nothing else: legs and corners that are as they were stay.
+  // Redraw only the legs and corners that the verdict of a drag has changed.
   update(model) {
     if (!this.model || this.model.path.length !== model.path.length || this.model.items.length !== model.items.length) return this.show(model);
     this.model = model;
@@ -157,7 +157,7 @@ export class MapView {
     while (parts.length > Math.ceil((points.length - 1) / CHUNK)) parts[parts.length - 1].remove();
   }
 
-  // An item follows the hand before the server has answered.
+  // Move an item with the pointer before the server has answered.
   dragged(k, east, north) {
     const item = this.at.get(k);
     if (!item) return;
@@ -189,10 +189,10 @@ export class MapView {
     this.marks.find((mark) => Number(mark.dataset.k) === k)?.focus({ preventScroll: true });
   }
 
-  // Everything that depends on the view.
+  // Update everything that depends on the view.
   layOut() {
     for (const one of [this.world, this.land]) one.setAttribute("transform", this.view.transform());
-    // Where waypoints stand closer than their dots are wide, small ones leave the legs and their colours to be seen.
+    // If waypoints are closer than the width of their dots, use small dots, so that the colours of the legs stay visible.
     const places = this.model.items.map((item) => this.at.get(item.k)), apart = places.slice(1).map((p, i) => Math.hypot(p[0] - places[i][0], p[1] - places[i][1]));
     const middle = apart.sort((a, b) => a - b)[apart.length >> 1] || 0;
     this.markers.classList.toggle("dense", middle * this.view.scale < 13);
@@ -208,7 +208,7 @@ export class MapView {
       const x = this.view.x(east), y = this.view.y(north);
       if (this.places[i] === `${x} ${y}`) return;
       this.places[i] = `${x} ${y}`;
-      // A transform each would cost the browser more than all of the rest.
+      // A transform for each element would take the browser longer than everything else.
       for (const circle of group.children) {
         circle.setAttribute("cx", x);
         circle.setAttribute("cy", y);
@@ -216,7 +216,7 @@ export class MapView {
     });
   }
 
-  // Between two places in a row a diamond inserts one, where the leg is long enough for the hand.
+  // Draw a diamond for inserting a waypoint between two items, if the leg is long enough.
   placeDiamonds() {
     clear(this.diamonds);
     this.middles = [];
@@ -243,7 +243,7 @@ export class MapView {
       labels.block(this.view.x(east), this.view.y(north), 7);
     }
     for (const one of this.middles) labels.block(one.x, one.y, 6);
-    // The scale with the compass above it, and the legend.
+    // Reserve the space of the scale with the compass above it, and of the legend.
     labels.taken.push([this.view.width - 200, this.view.height - TOOLS, this.view.width, this.view.height]);
     labels.taken.push([0, this.view.height - TOOLS, 110, this.view.height]);
     const by = items.length > DENSE ? Math.ceil(items.length / 40) : 1;
@@ -288,7 +288,7 @@ export class MapView {
     text.textContent = bar >= 1000 ? `${bar / 1000} km` : `${bar} m`;
   }
 
-  // What lies below the pointer: a waypoint before a diamond, the nearest of each.
+  // Return what is below the pointer: the nearest waypoint, or else the nearest diamond.
   hit(x, y, touch) {
     const near = (list, most) => {
       let best = null, least = most;
@@ -308,7 +308,7 @@ export class MapView {
     return middle ? { after: middle.after } : null;
   }
 
-  // The legs below the pointer, the worst first: those of all laps that are as near as the nearest one.
+  // Return the legs below the pointer, the worst first: legs of all laps that are as close as the nearest leg.
   legsAt(x, y) {
     const found = [], { legs } = this.model.states;
     this.model.path.forEach((flat, k) => {
@@ -334,8 +334,8 @@ export class MapView {
     return [east, north];
   }
 
-  // The whole mission: its items, and the path with its arcs and circles.
-  // The open legend covers no waypoint: the mission is fitted above it.  box: the legend.
+  // Fit the view to the whole mission: its items, and the path with its arcs and loiters.
+  // The open legend must not cover a waypoint, so the mission is fitted above it.  box: the legend.
   setLegend(box) {
     this.legendHeight = box.open ? box.offsetHeight + 44 : 0;
     const under = box.getBoundingClientRect();
@@ -353,19 +353,19 @@ export class MapView {
   }
 }
 
-// Set what differs: what is set is painted anew.
+// Set an attribute only if it differs, because a set attribute is repainted.
 function renew(part, name, value) {
   if (part.getAttribute(name) !== value) part.setAttribute(name, value);
 }
 
 const ORDER = ["fail", "open", "near", "ok"];
 
-// Orders states, [name, text, closeness], with the one that decides first: the worst, and of two alike the closer to its limit.
+// Compare two states [name, text, closeness]: the worse one is first, or else the one closer to its limit.
 export function byWorst(a, b) {
   return ORDER.indexOf(a[0]) - ORDER.indexOf(b[0]) || Math.sign((a[2] ?? FAR) - (b[2] ?? FAR));
 }
 
-// The worst state of the corners at each item, by its number, and with the legs to and from it; none where no stop is.
+// Return the worst state at each item by its index, of its corners and, if requested, its legs; none for an item without a stop.
 export function cornerStates(model, withLegs) {
   const found = new Map(), { corners, legs } = model.states;
   model.of.forEach((k, i) => {
@@ -378,7 +378,7 @@ export function cornerStates(model, withLegs) {
   return found;
 }
 
-// The states of the legs to and from an item.
+// Return the states of the legs to and from an item.
 export function legStates(model, k) {
   const found = [];
   model.of.forEach((own, i) => {

@@ -1,4 +1,4 @@
-// The panels beside the map: verdict with suggestions, table of waypoints, planner, settings, files.
+// Draw the panels next to the map: verdict with suggestions, table of waypoints, planner, settings, files.
 
 import { clear, element, groundAt, plain } from "/axes.js";
 import { RANGES } from "/link.js";
@@ -9,18 +9,18 @@ const $ = (id) => document.getElementById(id);
 const TABS = ["verdict", "items", "plan", "settings", "files"];
 const FORMS = [["waypoints", ".waypoints", "QGC WPL 110: Mission Planner, QGroundControl, MAVProxy"], ["plan", ".plan", "QGroundControl, with fence and rally points"], ["plan.json", "plan.json", "planfly, with scenario and certificate"], ["kml", ".kml", "a map for Google Earth and others"]];
 const MOST_ROWS = 600;
-// Questions that take many flights: kind of the message, and title of its answer.
+// Questions that take many flights: kind of the message, and title of the answer.
 export const QUESTIONS = { returns: "Return to launch", campaign: "Flights in this weather", battery: "Battery", ground_risk: "Ground risk", window: "Times of take-off" };
-// Ways that one search looks for.
+// Number of paths that one search returns.
 const WAYS = 6;
 
-// The answer of a verdict, in the same words in the header and on its card.
+// Return the answer of a verdict, with the same words in the header and on its card.
 export function answerText(verdict, stale) {
   const failed = verdict.state === "fail" && verdict.failed ? `: ${verdict.failed} ${verdict.failed === 1 ? "finding" : "findings"}` : "";
   return `${verdict.answer}${failed}${stale ? ", changed since" : ""}`;
 }
 
-// The title of a list of findings, by what is in it.
+// Return the title of a list of findings, according to their states.
 function titleOf(findings, where) {
   const words = [[false, "fails"], [null, "is not judged"]].filter(([ok]) => findings.some((one) => one.ok === ok)).map((one) => one[1]);
   return `What ${words.join(" or ")}${where}`;
@@ -42,12 +42,12 @@ export class Panel {
         this.tabs[next].focus();
       });
     });
-    // A number that was entered gives way to what comes of it; one that is being typed stays.
+    // The server's value replaces a number that was entered, but not a number that is being typed.
     for (const box of Object.values(this.boxes)) {
       box.addEventListener("input", (event) => { event.target.entered = false; });
       box.addEventListener("change", ({ target }) => {
         target.entered = true;
-        // A number that there has to be is as it was where it is cleared.
+        // A required number that was cleared returns to its value.
         if (target.required && target.value === "") target.value = target.defaultValue;
       });
     }
@@ -55,7 +55,7 @@ export class Panel {
     this.files = [];
     this.saveForm = "waypoints";
     this.answers = {};
-    // Questions that were asked on this page, whose answers are to be seen when they come.
+    // Questions asked on this page, whose answers are scrolled into view when they arrive.
     this.asked = new Set();
   }
 
@@ -69,13 +69,13 @@ export class Panel {
     this.drawItems();
   }
 
-  // Shows a panel that may lie below what is seen.
+  // Show a panel, and scroll to it if it is outside the window.
   reveal(name) {
     this.show(name);
     if (this.boxes[name].getBoundingClientRect().top > innerHeight - 120) this.boxes[name].scrollIntoView({ block: "start" });
   }
 
-  // ---- what comes
+  // ---- messages from the server
 
   choices(message) {
     this.offered = message;
@@ -90,7 +90,7 @@ export class Panel {
     this.drawSettings();
   }
 
-  // Another mission was opened: what was found of the one before is of no use.
+  // Another mission was opened: discard the results for the previous one.
   forget() {
     this.flight = undefined;
     this.answers = {};
@@ -101,7 +101,7 @@ export class Panel {
 
   sheet(sheet) {
     this.now = sheet;
-    // Losses are those of the mission that was saved.
+    // The stated losses are those of the saved mission.
     if (this.file && this.file.rev !== sheet.rev) {
       const state = sheet.unsaved ? ", without the changes since" : "";
       clear(this.lossBox).append(element("p", { class: "more" }, `${this.file.text}${state}.`));
@@ -122,7 +122,7 @@ export class Panel {
     this.drawVerdict();
   }
 
-  // What passed its trial, by geometry or in flight.
+  // Show the suggestions that passed their trials, by geometry or in flight.
   tried(message) {
     if (message.job === "trials" && this.flight?.rev === message.rev) this.flight.findings = message.findings;
     this.drawVerdict();
@@ -150,7 +150,7 @@ export class Panel {
       if (flight.changes.length) part.append(element("p", {}, element("b", {}, "Since the last flight")), element("ul", { class: "changes" }, ...flight.changes.map((text) => element("li", {}, text))));
       box.append(part);
     }
-    // A place that the flight has judged, too, is listed only there; one that it did not reach with the changes of the geometry.
+    // List a place that the flight judged only with the flight, and an unreached place with its geometric suggestions.
     const isFlown = flight && !stale, flownFailed = isFlown ? flight.findings.filter((one) => one.ok !== true) : [];
     const same = (one) => (other) => other.title === one.title && other.where === one.where;
     const failed = now.findings.filter((one) => one.ok !== true && !flownFailed.some(same(one)));
@@ -173,7 +173,7 @@ export class Panel {
     return undefined;
   }
 
-  // A question, with its answer below it.
+  // Draw a question, with its answer below.
   ask(job, words, more) {
     const ask = () => { this.asked.add(job); this.app.send({ kind: job }); };
     const question = element("p", {}, element("button", { type: "button", "data-job": job, onclick: ask }, words), element("small", {}, more));
@@ -188,7 +188,7 @@ export class Panel {
       lines.length ? element("details", {}, element("summary", {}, "In full"), ...lines.map((line) => element("p", { class: "line" }, line))) : null);
   }
 
-  // planned: the same finding by geometry, if its changes are offered.
+  // planned: the same finding of the geometric verdict, if its suggestions are offered; otherwise undefined.
   finding(one, flown, planned) {
     const { rev } = this.now, from = planned || one, offers = from.offers.map((each, which) => element("li", {},
       each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: from.number, which, flown: flown && !planned }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
@@ -276,7 +276,7 @@ export class Panel {
     const { now } = this;
     if (!now || !this.first) return;
     const places = now.items.slice(0, MOST_ROWS);
-    // A mission without a scenario has only its own items.
+    // In a mission without a scenario, a path can only be planned between items.
     const ends = this.about?.ends ? ["the scenario's start", "the scenario's destination"] : ["choose an item", "choose an item"];
     for (const [box, words] of [[this.first, ends[0]], [this.last, ends[1]]]) {
       const kept = box.value;
@@ -327,7 +327,7 @@ export class Panel {
     box.append(element("h2", {}, "Back"), element("p", {}, element("button", { type: "button", disabled: !now?.unsaved, onclick: () => app.send({ kind: "revert" }) }, "Revert to the file"), element("small", {}, "undo brings the changes back")));
   }
 
-  // A file in the folder of the one that the command named, by its path or from a list.
+  // Choose a file in the server's folder, by its path or from a list.
   byPath() {
     const { app } = this, path = element("input", { id: "open-path", placeholder: "survey/mission.plan", autocomplete: "off", spellcheck: "false", onkeydown: (event) => event.key === "Enter" && open() });
     const open = () => path.value.trim() && app.send({ kind: "open", name: path.value.trim() });
@@ -365,12 +365,12 @@ export class Panel {
     return this.app.send({ kind: "open", name: file.name.slice(-200), data: btoa(parts.join("")) });
   }
 
-  // ---- long works
+  // ---- long tasks
 
   working({ job, share, text }, begins) {
     if (job === "trials" && begins) this.drawVerdict();
     for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) {
-      // Of the two buttons of the planner, the one that was pressed.
+      // Show the progress only on the button of the planner that was pressed.
       if (button.dataset.ways && Number(button.dataset.ways) !== (this.waysAsked || 1)) continue;
       button.dataset.share = `${Math.round(100 * share)} %`;
       button.title = text || "";
@@ -397,12 +397,12 @@ export class Panel {
   }
 }
 
-// An item without a place on the map: a speed, a jump.
+// Return the table row of an item without a position, such as a change of speed or a jump.
 function commandRow({ seq, text }) {
   return element("tr", { class: "command" }, element("td", {}, String(seq)), element("td", { colspan: "5" }, text));
 }
 
-// Builds a box anew; what takes the place of what had the focus has it then, with what was typed and not yet entered.
+// Rebuild a box, and restore the focus, with text that was typed but not entered.
 function keepFocus(box, build) {
   const had = document.activeElement, name = (one) => one.id || one.getAttribute("aria-label") || one.textContent;
   if (!box.contains(had) || had === box) return build();
@@ -413,7 +413,7 @@ function keepFocus(box, build) {
   const next = alike.sort((a, b) => Math.abs(all.indexOf(a) - at) - Math.abs(all.indexOf(b) - at))[0];
   if (next && typed !== null && !had.entered) {
     next.value = typed;
-    // The browser tells of no change of a field that it did not type in itself.
+    // A browser sends no change event for text that a script has set.
     next.addEventListener("blur", () => { if (next.value === typed && !next.entered) next.dispatchEvent(new Event("change", { bubbles: true })); }, { once: true });
   }
   (next || box).focus({ preventScroll: true });

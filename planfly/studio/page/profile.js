@@ -1,11 +1,11 @@
-// The profile: ground, required clearance, threats and zones, the way and the flight, with heights to drag.
+// Draw the profile: ground, required clearance, threats, zones, path and flight, with altitudes to drag.
 
 import { clear, groundAt, plain, svg, ticks } from "/axes.js";
 import { cornerStates } from "/map.js";
 
 const SIDES = { left: 52, right: 14, top: 12, bottom: 24 };
 const SAMPLES = 360;
-// Beyond so many items a state's dots are one shape.
+// Number of items above which all dots of a state are one shape.
 const MANY = 60;
 
 export class Profile {
@@ -39,7 +39,7 @@ export class Profile {
   upAt(y) { return this.low + ((this.height - SIDES.bottom - y) / (this.height - SIDES.top - SIDES.bottom)) * (this.high - this.low); }
   metresPerPixel() { return (this.high - this.low) / (this.height - SIDES.top - SIDES.bottom); }
 
-  // The ground below the way: the server's samples of the sheet, else those of the coarse grid while it is dragged.
+  // Return the ground below the path: the server's samples of the mission, or the coarse grid during a drag.
   groundLine() {
     const { profile, route } = this.model;
     if (profile) return profile.ground ? profile.x.map((x, i) => [x, profile.ground[i]]) : [];
@@ -55,7 +55,7 @@ export class Profile {
     return found;
   }
 
-  // While a height is dragged the axis stays, or the hand would lose the dot.
+  // Keep the axis during a drag of an altitude, so that the dot stays below the pointer.
   hold(held) { this.held = held; }
 
   draw() {
@@ -112,7 +112,7 @@ export class Profile {
     }
   }
 
-  // ground: a part of the way below which the ground is known.
+  // ground: a part of the path below which the ground is known.
   drawGround(ground) {
     const line = (more) => ground.map((p) => `${this.x(p[0]).toFixed(1)} ${this.y(p[1] + more).toFixed(1)}`);
     const base = this.height - SIDES.bottom, clearance = this.world?.clearance || 0;
@@ -130,7 +130,7 @@ export class Profile {
   }
 
   way() {
-    // Over all that stands behind the way.
+    // Draw the unit over everything behind the path.
     svg("text", { x: SIDES.left + 6, y: SIDES.top + 9, class: "unit" }, this.back).textContent = "m AMSL";
     const { route, states } = this.model, parts = { ok: [], near: [], open: [], fail: [] };
     for (let i = 0; i + 1 < route.length; i++) {
@@ -146,7 +146,7 @@ export class Profile {
     }
   }
 
-  // A dot an item, where the way first passes it.
+  // Draw one dot for each item, where the path first passes it.
   drawDots() {
     clear(this.dots);
     const worst = cornerStates(this.model), seen = new Set(), many = this.model.items.length > MANY ? {} : null;
@@ -183,7 +183,7 @@ export class Profile {
   }
 }
 
-// The parts of a line of [distance, height] whose heights are known.
+// Return the parts of a line of [distance, height] whose heights are known.
 function knownParts(line) {
   const parts = [[]];
   for (const point of line) {

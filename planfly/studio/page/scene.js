@@ -1,4 +1,4 @@
-// The mission in three dimensions: the ground as shaded faces, the way and the flight over it; drag turns it.
+// Draw the mission in three dimensions: shaded ground, with path and flight above it; a drag turns the view.
 
 import { groundAt } from "/axes.js";
 
@@ -47,7 +47,7 @@ export class Scene {
     this.later();
   }
 
-  // Direction of north as drawn without tilt, degrees clockwise from up.
+  // Return the direction of north in a view from above, degrees clockwise from up.
   northward() {
     return (-180 * this.turn) / Math.PI;
   }
@@ -56,7 +56,7 @@ export class Scene {
     return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   }
 
-  // Where the middle lies and how long a metre is, of the way with ground around it.
+  // Compute the centre and the scale of the view, for the path with some ground around it.
   frame() {
     const { model, world } = this.now, points = model.route;
     const side = (axis) => [Math.min(...points.map((p) => p[axis])), Math.max(...points.map((p) => p[axis]))];
@@ -71,7 +71,7 @@ export class Scene {
     this.scale = (0.92 * Math.min(this.width, 1.5 * this.height) * this.zoom) / span;
   }
 
-  // x and y in pixels, and how far behind the middle it lies.
+  // Return x and y in pixels, and the distance behind the centre.
   point(east, north, up) {
     const e = east - (this.east[0] + this.east[1]) / 2, n = north - (this.north[0] + this.north[1]) / 2;
     const cos = Math.cos(this.turn), sin = Math.sin(this.turn), across = e * cos - n * sin, deep = e * sin + n * cos;
@@ -138,7 +138,7 @@ export class Scene {
       const ground = groundAt(grid, east, north);
       if (!Number.isNaN(ground)) this.line(pen, [[east, north, ground], [east, north, up]]);
     }
-    // In the order of `colours`: the worst state is drawn last.
+    // Draw in the order of `colours`, the worst state last.
     const legs = Object.keys(colours).flatMap((state) => model.path.filter((_, k) => model.states.legs[k][0] === state).map((flat) => [state, flat]));
     for (const [state, flat] of legs) {
       const points = [];
@@ -165,7 +165,7 @@ export class Scene {
     pen.globalAlpha = 1;
   }
 
-  // The walls of a zone: each has a lower and an upper end at each corner.
+  // Draw the walls of a zone; each wall has a lower and an upper end at each corner.
   walls(pen, { kind, walls }) {
     pen.strokeStyle = pen.fillStyle = this.colour(kind === "inclusion" ? "stay-in" : "zone");
     pen.lineWidth = 1.2;

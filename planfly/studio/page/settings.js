@@ -1,8 +1,8 @@
-// The settings: what a mission is flown with.  Values go to the server as they are typed, and it says what is allowed.
+// Draw the settings of a mission's flight.  Values are sent to the server as typed, and the server checks them.
 
 import { clear, element } from "/axes.js";
 
-// Entries of a scenario's [limits]: the unit, and what counts where there is none.
+// Entries of a scenario's [limits]: key, unit, and text if there is no value.
 const LIMITS = [["min_clearance_m", "m", ""], ["max_height_m", "m", "no limit"], ["corridor_m", "m", "the autopilot's"], ["max_turn_deg", "°", "the aircraft's"], ["max_climb_deg", "°", "the aircraft's"], ["max_dive_deg", "°", "the aircraft's"]];
 const SURVEYS = [["", "as the mission says"], ["lines", "judged as lines"], ["path", "judged as any path"]];
 const PARAMETERS = /\.(parm|param|params)$/i;
@@ -12,7 +12,7 @@ export function field(words, input, id = input.id) {
   return element("div", { class: "field" }, element("label", { for: id }, words), input);
 }
 
-// Whether a file of this name is one of parameters.
+// Return true if a file of this name is a parameter file.
 export function isParameters(name) {
   return PARAMETERS.test(name);
 }
@@ -32,7 +32,7 @@ function list(id, values, chosen, change) {
   return element("select", { id, onchange: (event) => change(event.target.value) }, ...values.map(([value, words]) => element("option", { value, selected: value === chosen }, words)));
 }
 
-// A number as it is typed; an empty field is null, unless there has to be one.
+// Return a field for a number; an empty field is null, unless the number is required.
 function number(id, value, step, change, placeholder = "", required = false) {
   const shown = typeof value === "number" ? value : "";
   return element("input", { id, type: "number", step, value: shown, placeholder, required, onchange: ({ target }) => {

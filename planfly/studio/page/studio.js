@@ -1,4 +1,4 @@
-// The page: what the server sends is drawn, and what hands do is sent.
+// Run the page: draw what the server sends, and send what the user does.
 
 import { clear, element, groundAt, plain } from "/axes.js";
 import { Hands } from "/hands.js";
@@ -11,14 +11,14 @@ import { Scene } from "/scene.js";
 
 const $ = (id) => document.getElementById(id);
 const STOPPED = "Stopped; earlier results stay.";
-// Where edits wait that were made while the server did not answer, for a page that is opened with the next server's key.
+// Storage key of edits made while the server did not answer, for a page that is opened with the next server's token.
 const WAITING = "planfly-studio-waiting";
 const HISTORY = ["undo", "redo", "revert"];
 const map = new MapView($("map")), profile = new Profile($("profile"));
 const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {}, committed: null, queue: [], doubtful: null, lost: "" };
 let fitted = 0, scene = null;
 
-// ---- what the server sends
+// ---- messages from the server
 
 function onWorld(world) {
   now.world = world;
@@ -30,7 +30,7 @@ function onWorld(world) {
   if (now.model) drawAll();
 }
 
-// The compass of the map, or of the scene while it is shown.
+// Draw the compass of the map, or of the scene while it is shown.
 function turnCompass() {
   if (now.world) drawCompass($("compass"), now.world.settings, inScene() ? scene.northward() : 0);
 }
@@ -39,12 +39,12 @@ function inScene() {
   return scene && !$("scene").hidden;
 }
 
-// What to do by hand, for those who have not made an edit.
+// Show hints on editing until the first edit.
 function showBegin() {
   $("begin").hidden = inScene() || Boolean(now.sheet?.undo || now.sheet?.redo);
 }
 
-// Ground that came for another world is not shown in this one.
+// Set the ground, unless it belongs to another world.
 function setGround() {
   const { world, heights, picture } = now;
   const own = (one) => one && world?.ground && JSON.stringify([one.east, one.north]) === JSON.stringify(world.shown);
@@ -60,7 +60,7 @@ function onSheet(sent) {
   now.sent = sent;
   now.lost = "";
   const same = sameItems(before, sheet), opened = before && isOther(before, sheet);
-  // What was wrong before an edit that was taken is over.
+  // An accepted edit clears the previous fault.
   if (now.committed) complain("");
   now.sheet = sheet;
   now.committed = null;
@@ -103,7 +103,7 @@ function onSheet(sent) {
   else pump();
 }
 
-// The straight line that stands for a path while one is searched: nobody asks whether it can be flown.
+// Return a placeholder mission with all states undecided, for the straight line shown while the first path is planned.
 function unjudged(sheet) {
   const open = (states) => states.map(() => ["open", ""]);
   return {
@@ -112,12 +112,12 @@ function unjudged(sheet) {
   };
 }
 
-// The search has ended without a path: the line is judged as any other mission.
+// If the search has ended without a path, judge the straight line like any other mission.
 function planningEnded(job) {
   if (job === "plan" && now.sheet?.planning) onSheet({ ...now.sent, planning: false });
 }
 
-// Whether both have the same items, but for one that may stand elsewhere: numbers of items mean the same in both.
+// Return true if both missions have the same items, with at most one moved item, so that indices mean the same in both.
 function sameItems(before, sheet) {
   if (!before || isOther(before, sheet) || before.items.length !== sheet.items.length) return false;
   let moved = 0;
@@ -128,14 +128,14 @@ function sameItems(before, sheet) {
   });
 }
 
-// Another mission was opened, or its opening was undone.
+// Return true if another mission was opened, or its opening was undone.
 function isOther(before, sheet) {
   return before.document !== sheet.document || before.name !== sheet.name;
 }
 
-// What waits was meant for the sheet before: it goes on to this one where its numbers mean the same, and else is left.
+// Move waiting edits on to a new mission if its indices mean the same; otherwise discard them.
 function catchUp(before, sheet, same) {
-  // An edit that was on its way when the connection was lost was made if the items have changed since.
+  // An edit that was being sent when the connection was lost was applied if the items have changed since.
   if (now.doubtful && same && JSON.stringify(before.items) === JSON.stringify(sheet.items)) now.queue.unshift(now.doubtful);
   now.doubtful = null;
   const waiting = now.queue.length, other = before && isOther(before, sheet);
@@ -152,13 +152,13 @@ function catchUp(before, sheet, same) {
   if (left) complain("The mission has changed in the meantime, so the last edit was not made.");
 }
 
-// A model with an item elsewhere.
+// Return a model with an item moved.
 function placed(model, k, to) {
   return { ...model, items: model.items.map((one) => (one.k === k ? { ...one, at: [to.east ?? one.at[0], to.north ?? one.at[1], to.up ?? one.at[2]] } : one)) };
 }
 
-// One edit at a time is on its way; what follows it waits for the sheet that it comes to.
-// Edits that the server cannot be sent wait for it, too; what else was asked of it is not done.
+// Send one edit at a time; the next one waits for the mission that results.
+// Edits that cannot be sent to the server wait, too; other requests are discarded.
 function pump() {
   while (!now.committed && now.queue.length) {
     if (now.lost || !link.send(now.queue[0])) return sayLost(now.lost || "The studio does not answer.");
@@ -172,7 +172,7 @@ function isEdit({ rev, kind }) {
   return rev !== undefined || kind === "settings" || HISTORY.includes(kind);
 }
 
-// The connection is lost: what becomes of the edits.
+// The connection is lost: state what happens to the edits.
 function sayLost(text) {
   now.lost = text;
   now.doubtful = now.committed || now.doubtful;
@@ -188,8 +188,8 @@ function sayLost(text) {
   return complain(`${text} ${edits} sent when the studio answers again in this tab.`, true);
 }
 
-// The edits that waited in this tab for another run of the studio: the sheet that they were made on, or null.
-// Each run numbers its documents anew: the name and the items tell whether it is the same.
+// Take the edits that waited in this tab for another run of the studio; return the mission that they were made on, or null.
+// Each run numbers its documents again, so name and items show if it is the same mission.
 function takeWaiting(number) {
   const { sheet = null, queue = [], doubtful = null } = JSON.parse(sessionStorage.getItem(WAITING) || "{}");
   now.queue.unshift(...queue);
@@ -197,7 +197,7 @@ function takeWaiting(number) {
   return sheet && { ...sheet, document: number };
 }
 
-// A verdict on a drag: of all, or of the legs about the item, which are put in their places.
+// Show the verdict on a drag: on the whole mission, or on the legs near the item, which replace the old ones.
 function onPreview(message) {
   const { dragging } = now;
   if (!dragging || message.rev !== now.sheet.rev || message.k !== dragging.k || message.n < dragging.since) return;
@@ -211,7 +211,7 @@ function onPreview(message) {
     now.checking = false;
   } else {
     now.checking = true;
-    // Other legs than the sheet's are coloured when all is judged.
+    // A route with another number of legs is coloured when the whole mission is judged.
     if (message.total_legs !== now.sheet.path.length) return answers();
     now.model = merged(now.sheet, message.windows);
   }
@@ -224,7 +224,7 @@ function onPreview(message) {
   document.documentElement.dataset.shown = message.n;
 }
 
-// While a hand drags on the map the profile follows a frame later: the colours below the hand come first.
+// During a drag on the map, draw the profile one frame later, after the colours below the pointer.
 let profileWaits = false;
 function drawProfileSoon() {
   if (profileWaits) return;
@@ -244,7 +244,7 @@ function merged(model, windows) {
     for (const kind of ["legs", "corners"]) {
       one.states[kind].forEach((state, i) => {
         const old = model.states[kind][one.first + i];
-        // Bounds are judged with the whole flight: until then what failed by them fails.
+        // Bounds are judged only with the whole mission; until then a failure of bounds stays.
         copy.states[kind][one.first + i] = old[0] === "fail" && old[1].startsWith("bounds") && state[0] !== "fail" ? old : state;
       });
     }
@@ -252,7 +252,7 @@ function merged(model, windows) {
   return copy;
 }
 
-// The dragged item stays below the hand, whatever the server has seen of it.
+// Keep the dragged item below the pointer, whatever position the server has judged.
 function hold() {
   const drop = now.dragging?.drop;
   if (!drop) return;
@@ -261,7 +261,7 @@ function hold() {
 
 const SEVERITY = ["ok", "near", "open", "fail"];
 
-// A sheet with the worse of the states by geometry and by the flight of this very mission.
+// Return a mission with the worse of its states by geometry and by the flight of the same revision.
 function withFlight(sheet) {
   const { flown } = now;
   if (!flown || flown.rev !== sheet.rev || sheet.planning) return sheet;
@@ -298,7 +298,7 @@ function onFlown(flown) {
 function onWorking(work) {
   const begins = now.work[work.job]?.number !== work.number;
   now.work[work.job] = work;
-  // What was stopped before is of no interest to who asks for more.
+  // A new task clears the message that the previous task was stopped.
   if (begins && (now.stopping || $("message").textContent === STOPPED)) {
     now.stopping = false;
     complain("");
@@ -308,7 +308,7 @@ function onWorking(work) {
   panel.working(work, begins);
 }
 
-// What fails beside the edits (a flight, a plan, a disk that is full) leaves them as they are.
+// Show a fault.  A fault of a task, such as a flight, a search or an autosave, leaves the edits unchanged.
 function onFault({ text, job }) {
   complain(text);
   panel.drawSettings();
@@ -333,7 +333,7 @@ function onStopped({ job }) {
   planningEnded(job);
 }
 
-// Suggestions that passed their trials, by geometry or in flight.
+// Show the suggestions that passed their trials, by geometry or in flight.
 function onTried(message) {
   now.work[message.job] = null;
   progress();
@@ -380,7 +380,7 @@ function answers() {
   }
   if (model.planning) setAnswer("geometry", "none", "planning \u2026", "");
   else setAnswer("geometry", shown, now.fault || words, model.verdict.headline);
-  // The trials by geometry come before the flight.
+  // Trials of geometric suggestions are shown as the start of the flight.
   const work = now.work.fly || now.work.geometry_trials;
   if (work && !now.dragging) setAnswer("flown", "checking", `flying ${Math.round(100 * (work.share || 0))} %`, work.text || "");
   else if (!flown) setAnswer("flown", "none", "not yet", "");
@@ -396,7 +396,7 @@ function setAnswer(id, state, words, title) {
 }
 
 function showName(name, unsaved) {
-  // The mark comes first, so that a long name does not hide it.
+  // The mark is first, so that a long name does not hide it.
   $("name").textContent = (unsaved ? "\u2022 " : "") + name;
   $("name").title = unsaved ? `${name}, not saved` : name;
   document.title = `${unsaved ? "\u2022 " : ""}${name} \u2013 planfly studio`;
@@ -405,11 +405,11 @@ function showName(name, unsaved) {
 function progress() {
   const works = Object.values(now.work).filter(Boolean), bar = $("progress");
   $("stop").hidden = !works.length;
-  // What is tried by flight has no known end.
+  // The end of trial flights is unknown, so they have no bar.
   const long = works.find((one) => !["fly", "trials", "geometry_trials"].includes(one.job)) || now.work.fly;
   bar.hidden = !long;
   if (!long) return;
-  // Each work has a bar of its own, or the next one's would shrink from where the last one's was.
+  // Use a new bar for each task; otherwise the bar would shrink from the end of the previous task.
   if (bar.dataset.number !== String(long.number)) bar.replaceChildren(element("i"));
   bar.dataset.number = long.number;
   bar.firstElementChild.style.width = `${Math.max(2, Math.round(100 * long.share))}%`;
@@ -430,7 +430,7 @@ function complain(text, stays) {
   if (text && !stays) faultTimer = setTimeout(() => { box.hidden = true; }, 9000);
 }
 
-// ---- what hands do
+// ---- user actions
 
 const app = {
   map, profile,
@@ -474,31 +474,31 @@ const app = {
     map.root.classList.remove("dragging");
     $("panel-verdict").classList.remove("before");
     link.settle();
-    // Moves that wait to be sent stay where they were made.
+    // Show moves that wait to be sent where they were made.
     now.model = [now.doubtful, ...now.queue].reduce((model, one) => (one?.kind === "move" ? placed(model, one.k, one) : model), withFlight(now.sheet));
     drawAll();
     answers();
     app.hint(null);
   },
-  // An edit of the sheet that it was begun on: rev is taken now where the message has none.
+  // Send an edit of the mission on which it was begun; a message without `rev` gets the current revision.
   commit(message) {
     link.settle();
     app.flush();
     const last = now.queue.at(-1);
-    // Of moves of one item that wait, the newest is sent.
+    // If several moves of one item wait, send only the newest.
     if (message.kind === "move" && last?.kind === "move" && last.k === message.k) Object.assign(last, message, { rev: last.rev });
     else now.queue.push({ rev: now.sheet.rev, ...message });
     pump();
   },
-  // Anything else that is asked of the server, after the edits that were made before it.
+  // Send any other request, after the edits that were made before it.
   send(message) {
-    // The hint is about the mission as it was.
+    // The hint is about the mission before the request.
     if (HISTORY.includes(message.kind)) app.hint(null);
     app.flush();
     now.queue.push(message);
     pump();
   },
-  // The keys that have added up.
+  // Send the accumulated moves by keys.
   flush() {
     const { nudged } = now;
     clearTimeout(now.nudgeTimer);
@@ -509,7 +509,7 @@ const app = {
     now.committed = null;
     now.queue = [];
   },
-  // Keys come faster than answers: they add up, and are sent as one.
+  // Accumulate moves by keys, which come faster than answers, and send them as one.
   nudge(k, to) {
     if (now.nudged && now.nudged.k !== k) app.flush();
     now.model = placed(now.model, k, to);
@@ -518,7 +518,7 @@ const app = {
     clearTimeout(now.nudgeTimer);
     now.nudgeTimer = setTimeout(() => { if (!now.committed) app.flush(); }, 60);
   },
-  // It is drawn with the next frame, which lays out the page anyway.
+  // Draw the hint in the next frame, which lays out the page anyway.
   hint(lines, x, y, state) {
     if (!now.hint) requestAnimationFrame(drawHint);
     now.hint = { lines, x, y, state };
@@ -576,7 +576,7 @@ const panel = new Panel(app);
 const hands = new Hands(app);
 const link = new Link({
   open: () => complain(""),
-  // What goes on is said with the next connection.
+  // Tasks in progress are reported again after the next connection.
   lost: (text) => { now.work = {}; progress(); app.flush(); sayLost(text); },
   world: onWorld,
   sheet: onSheet,

@@ -11,7 +11,7 @@ import pytest
 
 import planfly
 from planfly.runtime import process_setup
-from planfly.runtime.process_setup import address_space_limit, prepare_process, watch_address_space, with_large_stack
+from planfly.runtime.process_setup import address_space_limit, guard_imports, prepare_process, with_large_stack
 from tests.soak import some
 from world.address_space import AddressSpaceGuard
 
@@ -68,11 +68,11 @@ def test_only_a_process_with_a_limit_is_watched(monkeypatch: pytest.MonkeyPatch)
     before = list(sys.meta_path)
     monkeypatch.setattr(sys, "meta_path", list(before))
     monkeypatch.setattr(process_setup, "address_space_limit", lambda: None)
-    watch_address_space()
+    guard_imports()
     assert sys.meta_path == before
     monkeypatch.setattr(process_setup, "address_space_limit", lambda: LIMIT)
     for _ in range(2):
-        watch_address_space()
+        guard_imports()
     assert [type(one) for one in sys.meta_path[:2]] == [AddressSpaceGuard, type(before[0])]
 
 

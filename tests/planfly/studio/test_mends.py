@@ -185,7 +185,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
         LONG_WORKER, Answer(asked[0].number, "done", [straight_plan(session.context.scenario, 3)]), session
     )
     assert [one["kind"] for one in answers] == ["stopped", "fault"]
-    assert not jobs.has_new_initial_plan(session)
+    assert not jobs.take_initial_plan(session)
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
     again.start_first_task(session)

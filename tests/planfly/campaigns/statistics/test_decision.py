@@ -114,7 +114,7 @@ def test_its_edges_are_where_the_evidence_is_twenty() -> None:
     low, high = bound.interval(180, 20)
     assert 0.0 < low < 0.9 < high < 1.0
     for edge in (low, high):
-        terms = [w * math.exp(betaln(180 + a, 20 + b) - betaln(a, b)) for w, a, b in bound.parts]
+        terms = [w * math.exp(betaln(180 + a, 20 + b) - betaln(a, b)) for w, a, b in bound.components]
         assert sum(terms) / (edge**180 * (1 - edge) ** 20) == pytest.approx(20.0, rel=1e-6)
 
 
@@ -123,7 +123,7 @@ def left_out(p: float, target: float, most: int) -> tuple[float, float]:
 
     By the law of the number of failures after each flight, of the campaigns that go on: no draws.
     """
-    parts = StoppingBound(target).parts
+    parts = StoppingBound(target).components
     count = np.arange(most + 1)
     logs = [
         (math.log(w) - betaln(a, b), gammaln(count + a), gammaln(count + b), gammaln(count + a + b))
@@ -176,7 +176,7 @@ def test_it_covers_at_all_stopping_times_and_prove_errs_in_at_most_a_twentieth(p
     campaigns, most = (1000, 20_000) if SOAK else (300, 3000)
     bound, enough = StoppingBound(0.99), -math.log(0.05)
     random = np.random.default_rng(7)
-    parts = np.array(bound.parts)
+    parts = np.array(bound.components)
     left = erred = 0
     when = np.array([n for n in looks(most) if n <= most])
     for _ in range(campaigns):

@@ -5,7 +5,7 @@ import pytest
 
 from planfly.campaigns.statistics.decision import (
     MIN_FLIGHTS_FOR_INDEX,
-    chance_probability,
+    dependence_p_value,
     first_order_index,
     rank_slope,
 )
@@ -65,7 +65,7 @@ def test_rank_slope_says_which_way() -> None:
 def test_chance_is_as_rare_as_it_says() -> None:
     """Of 500 pairs that do not depend on each other 5 % are below 0.05, at most; the deviation is 1 %."""
     random = np.random.default_rng(4)
-    found = np.array([chance_probability(*random.random((2, 40))) for _ in range(500)])
+    found = np.array([dependence_p_value(*random.random((2, 40))) for _ in range(500)])
     assert 0.02 < np.mean(found < 0.05) < 0.08
 
 
@@ -81,7 +81,7 @@ def test_the_fewest_flights_name_nothing_that_has_no_effect(has_ties: bool) -> N
         margins = random.standard_normal(MIN_FLIGHTS_FOR_INDEX)
         margins = np.maximum(margins, 0.0) if has_ties else margins
         quantities = random.random((8, MIN_FLIGHTS_FOR_INDEX))
-        alarms += min(chance_probability(values, margins) for values in quantities) <= MOST_OF_EIGHT
+        alarms += min(dependence_p_value(values, margins) for values in quantities) <= MOST_OF_EIGHT
     assert alarms <= 11
 
 
@@ -92,14 +92,14 @@ def test_the_fewest_flights_name_what_explains_most_of_a_margin() -> None:
     named = 0
     for _ in range(200):
         values, others = random.standard_normal((2, MIN_FLIGHTS_FOR_INDEX))
-        named += chance_probability(values, np.sqrt(0.7) * values + np.sqrt(0.3) * others) <= MOST_OF_EIGHT
+        named += dependence_p_value(values, np.sqrt(0.7) * values + np.sqrt(0.3) * others) <= MOST_OF_EIGHT
     assert named >= 180
 
 
 def test_a_rise_and_a_valley_are_no_chance() -> None:
     """Spearman finds the rise in 40 values, and the groups find the valley, whose rank correlation is 0."""
     x = np.linspace(-1.0, 1.0, 40)
-    assert chance_probability(x, x) < 1e-6
-    assert chance_probability(x, x**2) < 1e-3
-    assert chance_probability(x[:19], x[:19]) == 1.0
-    assert chance_probability(x, np.ones(40)) == 1.0
+    assert dependence_p_value(x, x) < 1e-6
+    assert dependence_p_value(x, x**2) < 1e-3
+    assert dependence_p_value(x[:19], x[:19]) == 1.0
+    assert dependence_p_value(x, np.ones(40)) == 1.0
