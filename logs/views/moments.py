@@ -1,4 +1,4 @@
-"""Build the data of a flight by moment for the page, and the aircraft model."""
+"""Collect the moments of a flight (thinned rows of its track), its place names and the aircraft model for the page."""
 
 from typing import Any
 
@@ -18,13 +18,13 @@ MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Return at most `MAX_MOMENTS` rows of a flight as columns for the page, by name.
+    """Return at most `MAX_MOMENTS` rows of a flight as JSON data for the page: a list of values for each column.
 
     The columns are time (s); east, north (m), up (m AMSL) and above (m above ground); airspeed and climb (m/s); bank
-    (right positive), pitch and heading (deg); and leg.  The key "legs" has the names of the legs.  Unknown values are
-    null.  Rows without a position are left out.
+    (right positive), pitch and heading (degrees); and leg.  The key "legs" has the names of all legs.  Unknown values
+    are None.  Rows without a position are left out.
 
-    name, role: name and role of the line.
+    name, role: legend text and role of the flight's line on the map.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -57,7 +57,7 @@ def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", rol
 
 
 def leg_names(setup: FlightSetup) -> list[str]:
-    """Return the name of each leg, with the mission item that it leads to.
+    """Return the name of each leg of the route, with the mission item that it leads to.
 
     >>> from logs.recording.example_log import example_log
     >>> leg_names(example_log().setup)[0]
@@ -71,7 +71,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
-    """Return the name of each waypoint, with its mission item and altitude."""
+    """Return a text on each waypoint of the route: its name with its mission item, and on a second line its altitude."""
     heights, numbers = setup.display_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
         f"{place_text(Place('waypoint', k, item=_get_item(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
@@ -80,18 +80,18 @@ def waypoint_names(setup: FlightSetup) -> list[str]:
 
 
 def _get_item(item: int) -> int | None:
-    """Return the number of a mission item, or None for a waypoint without an item."""
+    """Return the item number of a waypoint, or None if it is negative: a waypoint without a mission item."""
     return item if item >= 0 else None
 
 
 def aircraft_model() -> dict[str, Any]:
-    """Return corners and colours of the triangles that depict the aircraft on the page.
+    """Return corners and colours of the triangles that depict the aircraft on the page, as JSON data.
 
-    Corners are forward, left and up, in units of the span.
+    Coordinates of corners are forward, left and up, in wing spans; colours are red, green and blue, 0 to 1.
     """
 
     def round_values(values: NDArray[np.float32]) -> Any:
-        """Return values as a list, rounded to four decimals."""
+        """Convert an array to nested lists, rounded to four decimals."""
         return np.round(values.astype(np.float64), 4).tolist()
 
     return {"corners": round_values(model_corners() / MODEL_SPAN_M), "colours": round_values(model_colours()[:, :3])}
