@@ -1,8 +1,8 @@
 """A chart as plain data: panels of lines, bands, bars and dots with names, units and roles.
 
-Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper; and the script of the HTML page
-with plotly.js, from the data of `chart_json`.  A role is a word for what is drawn ("missile", "planned"); `logs.theme`
-gives each role its style.
+Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper; and the script of the HTML
+page with plotly.js, from the data of `chart_json`.  A role is a word for what is drawn ("missile", "planned");
+`logs.theme` gives each role its style.
 """
 
 import math

@@ -32,7 +32,10 @@ class EnvelopeLine:
 
 
 def sample_envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
-    """Return the envelope at the lowest and at the highest altitude of the route; one line if they round to the same m."""
+    """Return the envelope at the lowest and at the highest altitude of the route, in that order.
+
+    There is one line if both altitudes round to the same metre.
+    """
     envelope, altitudes = setup.envelope, setup.route.positions[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []

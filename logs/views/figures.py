@@ -123,7 +123,7 @@ def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
 
 
 def _make_returns_view(name: str) -> Callable[[Subject], View | None]:
-    """Make a function that builds the view of one of the `RETURN_FIGURES`, or returns None if no returns were judged."""
+    """Make a function that builds the view of one of the `RETURN_FIGURES`, or returns None without judged returns."""
 
     def make_view(subject: Subject) -> View | None:
         """Build the figure's view; None if no returns were judged or there is nothing to draw."""

@@ -1,6 +1,6 @@
 """Chart a front of plans: all plans from above, and the objectives of each plan over its length.
 
-A front is a set of plans of which none is at least as good as another in all objectives and better in one.
+In a front (Pareto front), no plan is better than another plan in every objective.
 """
 
 import math

@@ -52,7 +52,7 @@ class Instruments:
     log: log whose legs were computed from its track.
     entries: timeline of the flight.
     ground: altitude of the ground under each row of the track, m AMSL, (t,); NaN if unknown.
-    limits: name and limit of each control, rad, or a fraction for the throttle.
+    limits: name of each control and its greatest deflection in either direction, rad; 1 for the throttle.
     """
 
     log: FlightLog

@@ -52,7 +52,7 @@ class ParameterRow(NamedTuple):
     """A row of the table of parameters, as text.
 
     low, high: ends of the 95 % interval.
-    share: contribution of the logs, as opposed to the prior, to the estimate, percent.
+    share: part of the prior's variance that the logs remove, percent.
     """
 
     title: str
