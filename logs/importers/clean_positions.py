@@ -207,8 +207,8 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
     """Find glitches: rows far from the path of the vehicle.  Return a mask (n,), True for their rows.
 
     A glitch begins with a leap that no vehicle can fly and ends with a second leap, after which the vehicle is at a
-    position that it could have reached from the last row before the glitch.  It has at most `MAX_GLITCH_ROWS` rows.  The
-    first or the last row is also a glitch if a leap separates it from the others.  Fewer than five rows have no glitch.
+    position that it could have reached from the last row before the glitch.  It has at most `MAX_GLITCH_ROWS` rows.
+    The first or the last row is also a glitch if a leap separates it from the others.  Fewer than five rows have none.
 
     time: increasing times, s, (n,).
     values: latitude and longitude (degrees) and altitude (m), (n, 3).

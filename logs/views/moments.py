@@ -71,7 +71,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
-    """Return a text on each waypoint of the route: its name with its mission item, and on a second line its altitude."""
+    """Return a text on each waypoint of the route: its name with its mission item, and below that its altitude."""
     heights, numbers = setup.display_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
         f"{place_text(Place('waypoint', k, item=_get_item(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"

@@ -164,7 +164,7 @@ def _compute_planned_altitudes(
 
     waypoint_distances: distance of each waypoint along the route, m, (w,).
     route: waypoints, m, (w, 3).
-    height_above_ground: height above ground at the end of each leg, m, (w,); NaN if the leg does not follow the terrain.
+    height_above_ground: height above ground at the end of each leg, m, (w,); NaN for legs that ignore the terrain.
     distance, line_altitude, ground: distance along the route, straight-line altitude and ground altitude of each
         sample, m, (s,).
     """

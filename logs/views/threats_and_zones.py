@@ -186,7 +186,7 @@ class PathPlane:
     max_altitude: float
 
     def min_visible_altitudes(self) -> Floats:
-        """Return the altitude of the ground or, if higher, of the profile's lower edge, at each sample, m AMSL, (s,)."""
+        """Return the higher of the ground and the profile's lower edge at each sample, m AMSL, (s,)."""
         base = np.full(len(self.points), self.min_altitude)
         return base if self.ground is None else np.fmax(self.ground, self.min_altitude)
 
@@ -230,7 +230,7 @@ def threat_cuts(
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Cut the spheres of threats that failed by a vertical plane; return a layer of each section, and label positions.
+    """Cut the spheres of failing threats by a vertical plane; return a layer of each section, and label positions.
 
     The label positions (km, m AMSL) are keyed by the index of the threat; threats without a visible outline have none.
     """
@@ -292,9 +292,9 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
 
 
 def zone_labels(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
-    """Return a label for each zone: at the center of an exclusion zone, at the northernmost corner of an inclusion zone.
+    """Return a label with the name and the altitude band of each zone; none for more than `_MAX_ZONE_NAMES` zones.
 
-    There are no labels if there are more than `_MAX_ZONE_NAMES` zones.
+    It is at the center of an exclusion zone, and at the northernmost corner of an inclusion zone.
     """
     if len(zones) > _MAX_ZONE_NAMES:
         return ()

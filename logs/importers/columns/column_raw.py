@@ -75,7 +75,7 @@ def read_columns(path: Path) -> RawLog:
 
 
 def _read_series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
-    """Yield the name and the data of each series in `logs.importers.raw_log.COLUMNS` that the log has, except positions."""
+    """Yield the name and the data of each series of a `RawLog` that the log has, except the positions."""
     velocity = read_velocity(log)
     if len(velocity.time):
         yield "velocity", LogSeries("ground velocity", velocity.time, velocity.values[:, [1, 0, 2]] * [1.0, 1.0, -1.0])

@@ -56,7 +56,7 @@ class ClockTable(_Table):
 
 
 class ConditionTable(_Table):
-    """The condition ``when`` of a column: only rows in which another column of the same clock has this value are used."""
+    """The condition ``when`` of a column: only rows in which another column of its clock has this value are used."""
 
     column: str
     value: float | str

@@ -119,7 +119,7 @@ class Instruments:
         return [shorten(line, columns).rstrip() for line in lines]
 
     def _draw_horizon(self, track_row: int, columns: int) -> list[str]:
-        """Draw the artificial horizon as lines: sky (blank) above, ground (:) below, the aircraft's wings in the center.
+        """Draw the artificial horizon as lines: sky (blank) above, ground (:) below, the wings in the center.
 
         track_row: index of the track's row.
         columns: width of the horizon without its edges.
