@@ -324,8 +324,8 @@ class ZoneCut:
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
     """Return the parts of a vertical plane along a path that zones forbid.
 
-    An exclusion zone forbids the altitudes from its floor to its ceiling.  An inclusion zone forbids the altitudes below
-    its floor and above its ceiling, and everything horizontally outside it.  Parts without any sample are left out.
+    An exclusion zone forbids the altitudes from its floor to its ceiling.  An inclusion zone forbids the altitudes
+    below its floor and above its ceiling, and everything horizontally outside it.  Parts without samples are left out.
     """
     min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)

@@ -49,7 +49,7 @@ def refly_lines(reflight: Reflight) -> list[str]:
 
 
 def describe_model_trust(reflight: Reflight) -> str:
-    """Return a line on the differences of an imported flight from its simulation, which show the trust in the model."""
+    """Return a line on how far an imported flight differs from its simulation, and with which model it was compared."""
     model = reflight.setup.aircraft
     model_text = f"{model}, used because no aircraft was named," if reflight.stands_in else model
     if not reflight.spreads:
