@@ -179,7 +179,7 @@ class _Reader:
         raw_times = np.concatenate(times)[order]
         is_finite = np.isfinite(raw_times)
         steady = remove_clock_jumps(raw_times[is_finite])
-        # Byte at which each of these n messages starts, (n,).  Shift to add to its time, s, (n,).  Times of the jumps, s.
+        # Byte at which each of these messages starts, (n,); shift to add to its time, s, (n,); times of the jumps, s.
         self._clock_starts = np.concatenate(starts)[order][is_finite]
         self._clock_shifts = steady.time - raw_times[is_finite]
         self._clock_jumps = steady.jumps

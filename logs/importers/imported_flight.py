@@ -150,7 +150,7 @@ def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) ->
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the part that followed its mission for the longest time; in a tie, the longest flight wins."""
+    """Return the index of the part that followed its mission for the longest time; in a tie, of the longest flight."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
