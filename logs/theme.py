@@ -1,8 +1,8 @@
-"""Define the colours, line widths and dashes of all pictures, pages and scenes; no other file states any.
+"""Define the colours, line widths and dashes of all pictures, pages and scenes.
 
-A role is a word for what is drawn ("missile", "planned"); charts name roles, never colours.  Each role has one style in
-a light and a dark variant.  PNG and SVG files use the light variant; pages switch between both by the reader's
-preference; scenes of Foxglove and Rerun are black and use the dark variant.
+No other file states any.  A role is a word for what is drawn ("missile", "planned"); charts name roles, never colours.
+Each role has one style in a light and a dark variant.  PNG and SVG files use the light variant; pages switch between
+both by the reader's preference; scenes of Foxglove and Rerun are black and use the dark variant.
 
 The colours of the data come from Okabe and Ito, "Color Universal Design" (2008), so that people with any of the common
 colour vision deficiencies can tell them apart.  Limits have ColorBrewer's violet.  Dashes, markers or hatches repeat
@@ -231,7 +231,9 @@ def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float,
 
 
 def palette_colours() -> tuple[str, ...]:
-    """Return the light colours that a picture with a reduced palette keeps: all roles, paper, ink and highlight.
+    """Return the light colours that a picture with a reduced palette keeps.
+
+    They are the colours of all roles, and paper, ink and highlight.
 
     >>> colour("missile") in palette_colours()
     True
@@ -295,9 +297,9 @@ _SYMBOLS = {"circle": "circle", "triangle": "triangle-up", "star": "star", "cros
 
 
 def page_styles() -> dict[str, dict[str, object]]:
-    """Return the style of each role for the page's scripts, without colours, which `css_variables` defines.
+    """Return the style of each role for the page's scripts.
 
-    Widths, dashes and sizes are in pixels.
+    Colours are not included; `css_variables` defines them.  Widths, dashes and sizes are in pixels.
 
     >>> page_styles()["missile"]["dash"]
     'solid'

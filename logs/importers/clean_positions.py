@@ -181,7 +181,9 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
 
 
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
-    """Return the gaps between rows: pauses longer than both `MAX_STEP_S` and `MAX_STEP_RATIO` median steps.
+    """Return the gaps between rows.
+
+    A gap is a pause longer than both `MAX_STEP_S` and `MAX_STEP_RATIO` median steps.
 
     time: increasing times of the rows, s, (n,).
     """
@@ -249,10 +251,10 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
 
 
 def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove forward jumps of the clock: long time steps in which a moving vehicle hardly changed its position.
+    """Remove forward jumps of the clock.
 
-    Return the shifted times, s, (n,), and the shifts as in `CleanPositions.shifts`.  The times of fewer than 20 rows
-    are not changed.
+    They are long time steps in which a moving vehicle hardly changed its position.  Return the shifted times, s, (n,),
+    and the shifts as in `CleanPositions.shifts`.  The times of fewer than 20 rows are not changed.
 
     time: increasing times, s, (n,).
     values: latitude and longitude (degrees) and altitude (m), (n, 3).

@@ -204,7 +204,10 @@ class Dataflash:
     release_memory: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
-        """Return all indexed messages with a name, except a cut message at the end; length 0 if there are none."""
+        """Return all indexed messages with a name, except a cut message at the end.
+
+        The result has length 0 if there are none.
+        """
         numbers = [number for number, entry in self.formats.items() if entry.name == name and number in self.starts]
         if not numbers:
             return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
@@ -354,7 +357,9 @@ def _walk_messages(
     max_trailing_bytes: int,
     is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Find the requested messages that begin before byte `stop`; return their starts (byte numbers) and their types.
+    """Find the requested messages that begin before byte `stop`.
+
+    Return their starts (byte numbers) and their types.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
     lengths: length of the messages of each type, bytes, (256,); 0 if not yet known; updated at each FMT message.

@@ -259,7 +259,10 @@ class _Reader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; if several sensors or estimators log them, only those of the first one."""
+        """Return the messages with a name.
+
+        If several sensors or estimators log them, only those of the first one are returned.
+        """
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
@@ -305,7 +308,7 @@ class _Reader:
         return None
 
     def _read_position(self) -> LogSeries | None:
-        """Read latitude, longitude (degrees) and altitude (m): the estimated positions, or else the GPS positions.
+        """Read latitude, longitude (degrees) and altitude (m), estimated or else from GPS, (n, 3).
 
         Of the GPS positions, only those with a 3-D fix are returned if the log states the fix.  Return None if the log
         has neither.
@@ -390,7 +393,10 @@ class _Reader:
             yield from zip(self._compute_times(messages).tolist(), messages.texts("Message"), strict=True)
 
     def _find_utc_start(self) -> float:
-        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if no GPS time with a fix is logged."""
+        """Return the UTC time at time 0 of the log's clock, s since 1970.
+
+        Return NaN if no GPS time with a fix is logged.
+        """
         messages = self._select_messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if messages.has(weeks, millis, "TimeUS"):
@@ -433,7 +439,10 @@ _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1
 
 
 def _read_raw_time(messages: Messages) -> Floats:
-    """Return the times of messages as logged, s, (n,): from microseconds, or before 2015 from milliseconds."""
+    """Return the times of messages as logged, s, (n,).
+
+    They are logged in microseconds, before 2015 in milliseconds.
+    """
     if messages.has("TimeUS"):
         return messages.column("TimeUS") * 1e-6
     return messages.column("TimeMS") * 1e-3

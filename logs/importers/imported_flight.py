@@ -150,7 +150,10 @@ def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) ->
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the part that followed its mission for the longest time; in a tie, of the longest flight."""
+    """Return the index of the part that followed its mission for the longest time.
+
+    In a tie, the part of the longest flight is chosen.
+    """
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
@@ -429,11 +432,11 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """Return the mean of the logged wind while the flight followed its mission; None if the log contains no wind.
+    """Return the mean of the logged wind while the flight followed its mission.
 
-    If the flight never followed its mission with a known wind, it is the mean over the whole flight.  The first fifth
-    of the rows is left out, because the autopilot's estimate starts at zero and converges only in the first turns.  The
-    speed is limited to the largest wind speed that a scenario allows.
+    Return None if the log contains no wind.  If the flight never followed its mission with a known wind, it is the mean
+    over the whole flight.  The first fifth of the rows is left out, because the autopilot's estimate starts at zero and
+    converges only in the first turns.  The speed is limited to the largest wind speed that a scenario allows.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

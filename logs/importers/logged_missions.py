@@ -1,4 +1,4 @@
-"""Interpret data that several log formats contain: mission items, and numbers of flight modes of ArduPlane and PX4."""
+"""Interpret mission items and numbers of flight modes, which several log formats contain."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -96,7 +96,10 @@ def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
 
 
 def _make_comparison_key(item: MissionItem) -> tuple[object, ...]:
-    """Return the values of an item that must be equal in equal items; numbers are texts, so that NaN equals NaN."""
+    """Return the values of an item that must be equal in equal items.
+
+    Numbers are texts, so that NaN equals NaN.
+    """
     return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 

@@ -1,4 +1,4 @@
-"""Define the data of a log from which an aircraft model is identified: the motion of the aircraft at full rate.
+"""Define the data of a log from which an aircraft model is identified: motion at full rate.
 
 The data for a verdict are defined in `logs.importers.raw_log`.  `logs.importers.motion_log` reads the motion from logs.
 """
@@ -100,7 +100,7 @@ class MotionLog:
 
 
 def find_first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return the first position at which a vehicle stood still: latitude, longitude (degrees) and altitude (m).
+    """Return latitude, longitude (degrees) and altitude (m) where a vehicle first stood still.
 
     Return None if it never stood still.  Rows outside the times of the velocities, and rows without a valid position,
     are ignored.

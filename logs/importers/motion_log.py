@@ -1,4 +1,7 @@
-"""Read the motion of an aircraft from a log of any format; ArduPilot's dataflash logs are read in this module."""
+"""Read the motion of an aircraft from a log of any format.
+
+ArduPilot's dataflash logs are read in this module.
+"""
 
 import hashlib
 import math
@@ -148,7 +151,10 @@ class _DataflashMotionReader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; if several sensors or estimators log them, only those of the first one."""
+        """Return the messages with a name.
+
+        If several sensors or estimators log them, only those of the first one are returned.
+        """
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):

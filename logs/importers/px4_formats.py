@@ -1,4 +1,4 @@
-"""Count the fields in the message formats of a PX4 log before pyulog creates them, to refuse logs with too many.
+"""Count the fields in the formats of a PX4 log before pyulog creates them, to refuse too many.
 
 pyulog creates all fields of a topic when the log declares the topic.  A format may contain other formats, and arrays of
 them (PX4, "ULog File Format", Message Format): forty formats that each contain the next one twice take a kilobyte, but

@@ -100,10 +100,11 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
 
 
 class _FormatCheckingFile:
-    """A file from which pyulog reads; it checks the formats, and corrects pyulog's backward seeks after short reads.
+    """A file from which pyulog reads.
 
-    pyulog steps back by the stated length of a record even if fewer bytes were read, and would read the end of a
-    damaged file again and again.  This file steps back only by the bytes that were read.
+    It checks the formats, and corrects pyulog's backward seeks after short reads.  pyulog steps back by the stated
+    length of a record even if fewer bytes were read, and would read the end of a damaged file again and again.  This
+    file steps back only by the bytes that were read.
 
     pyulog first reads the three bytes of a record's length and letter, and then its content.
     """
@@ -114,7 +115,7 @@ class _FormatCheckingFile:
         self._formats = MessageFormats(source)
 
     def read(self, size: int) -> bytes:
-        """Read up to `size` bytes, and check them if they are the content of a record with a format or a topic.
+        """Read up to `size` bytes, and check the content of records with formats and topics.
 
         Raises LogError if the topics have too many fields.
         """
@@ -129,7 +130,10 @@ class _FormatCheckingFile:
         return data
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Change the position and return it; a relative seek is corrected by the bytes missing from the last read."""
+        """Change the position and return it.
+
+        A relative seek is corrected by the bytes missing from the last read.
+        """
         missing = self._missing if whence == 1 else 0
         self._missing = 0
         return self._file.seek(offset + missing, whence)
@@ -178,7 +182,7 @@ _IS_CUT = 4
 
 @compiled
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
-    """Walk over the records that begin before byte `stop`, and count damaged places and lost bytes in `state`.
+    """Walk over the records that begin before byte `stop`, and count the damage in `state`.
 
     The walk goes from record to record by their lengths.  In a damaged place, where no valid record begins, it
     continues byte by byte to the next valid record.
@@ -222,7 +226,9 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
 
 
 def _read_instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """Return fields of one instance of a topic as the columns of a series; None if the instance lacks them.
+    """Return fields of one instance of a topic as the columns of a series.
+
+    Return None if the instance lacks them.
 
     topic: name of the topic, which becomes the source of the series.
     data: values of each field of the instance, keyed by field name; empty for a topic that the log lacks.
@@ -461,7 +467,10 @@ class Topics:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the last value of each parameter, keyed by name; values that are not finite numbers are left out."""
+        """Return the last value of each parameter, keyed by name.
+
+        Values that are not finite numbers are left out.
+        """
         values = dict(self._log.initial_parameters)
         values |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged parameter may be a text.

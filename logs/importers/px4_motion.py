@@ -145,9 +145,10 @@ def _read_samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samp
 
 
 def _read_inertial(topics: Topics) -> Samples:
-    """Read specific force (m/s²) and angular rates (rad/s) about the body axes, (n, 6); no rows if not logged.
+    """Read specific force (m/s²) and angular rates (rad/s) about the body axes, (n, 6).
 
-    They come from the inertial sensors, or else from the two topics with filtered values.
+    There are no rows if they are not logged.  They come from the inertial sensors, or else from the two topics with
+    filtered values.
     """
     force = tuple(f"accelerometer_m_s2[{k}]" for k in range(3))
     rates = tuple(f"gyro_rad[{k}]" for k in range(3))
@@ -192,12 +193,12 @@ def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
 
 
 def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
-    """Read pitch, roll, yaw (fractions of full travel) and throttle, (n, 4), and True if the aircraft has elevons.
+    """Read pitch, roll, yaw (fractions of full travel) and throttle, (n, 4), and the elevon flag.
 
-    Controls are positive for pitch up, roll right and yaw right.  The control about an axis is the mean deflection of
-    all surfaces, weighted by their effects on that axis, which the parameters CA_SV_CSn_TRQ_* state.  The throttle is
-    the mean output of the forward motors.  Logs of releases before 1.14 contain the controls themselves, which are then
-    returned.  There are no rows if the log has neither.
+    The flag is True if the aircraft has elevons.  Controls are positive for pitch up, roll right and yaw right.  The
+    control about an axis is the mean deflection of all surfaces, weighted by their effects on that axis, which the
+    parameters CA_SV_CSn_TRQ_* state.  The throttle is the mean output of the forward motors.  Logs of releases before
+    1.14 contain the controls themselves, which are then returned.  There are no rows if the log has neither.
 
     Raises LogError for an airframe other than a plane, and for surfaces or motors that cannot be modelled.
 
@@ -285,9 +286,9 @@ def _find_forward_motors(topics: Topics, airframe: int, parameters: Mapping[str,
 
 
 def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Read the outputs of the first `size` actuators in a topic, sorted by time, (n, size); no rows without the topic.
+    """Read the outputs of the first `size` actuators in a topic, sorted by time, (n, size).
 
-    The output of an unused or stopped actuator is NaN.
+    There are no rows if the log lacks the topic.  The output of an unused or stopped actuator is NaN.
     """
     table = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if table is None:

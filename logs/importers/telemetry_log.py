@@ -1,4 +1,4 @@
-"""Read telemetry logs (`.tlog`) of ground stations, with messages of ArduPlane or PX4, into a `RawLog`.
+"""Read telemetry logs (`.tlog`) of ground stations, of ArduPlane or PX4, into a `RawLog`.
 
 The packets are found and decoded, grouped by the sending system, and then converted.  The clock is the vehicle's
 (`time_boot_ms`); messages without this time are placed by their time of reception.
@@ -88,7 +88,7 @@ class TelemetryReader:
     _decoder: Any = field(default_factory=lambda: dialect.MAVLink(None))
 
     def messages(self) -> Iterator[tuple[float, Any]]:
-        """Yield the time of reception, s since 1970, and the content of each wanted message, in the file's order."""
+        """Yield each wanted message with its time of reception, s since 1970, in the file's order."""
         position, end, is_in_record, piece_end = 0, len(self.data), True, PIECE_BYTES
         while position + _STAMP.size + _V1_FRAME <= end:
             if position >= piece_end:
@@ -205,7 +205,10 @@ class SystemMessages:
         rows.extend(float(getattr(message, field)) for field in fields)
 
     def table(self, name: str) -> Floats:
-        """Return all messages with a name in `NUMBERS`, (n, 1 + k): the index among all messages, then the k fields."""
+        """Return all messages with a name in `NUMBERS` as rows, (n, 1 + k).
+
+        A row is the index among all messages, then the k fields.
+        """
         rows = self._rows.get(name)
         return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
 
@@ -286,7 +289,9 @@ def read_telemetry(path: Path) -> RawLog:
 
 
 def read_vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
-    """Read the messages of the vehicle that sent the most messages; return them and the damage of the file.
+    """Read the messages of the vehicle that sent the most messages.
+
+    Return them and the damage of the file.
 
     Raises LogError for a log without a vehicle.
     """
@@ -391,7 +396,9 @@ class VehicleMessages:
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return fields of a message as the columns of a series, in the units of the message; None if never sent.
+        """Return fields of a message as the columns of a series, in the units of the message.
+
+        Return None if the message was never sent.
 
         name: name of the message, a key of `NUMBERS`.
         columns: names of the fields.
@@ -403,7 +410,10 @@ class VehicleMessages:
         return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
     def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        """Yield the name and the data of each series of a `RawLog`; None or nothing for a series that the log lacks."""
+        """Yield the name and the data of each series of a `RawLog`.
+
+        A series that the log lacks is None, or is not yielded.
+        """
         positions = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if positions is not None:
             is_known = (positions.values[:, :2] != 0.0).any(axis=1)

@@ -84,7 +84,9 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _find_earliest_time(stamps: NDArray[np.float64]) -> float:
-    """Return the earliest of a track's times, s, ignoring times that are `MAX_TIME_S` or more from the median.
+    """Return the earliest of a track's times, s.
+
+    Times that are `MAX_TIME_S` or more from the median are ignored.
 
     stamps: times, s, (n,).
     """
@@ -248,7 +250,10 @@ def read_igc(path: Path) -> RawLog:
 
 
 def _parse_degrees(degrees: str, minutes: str, thousandths: str, side: str) -> float:
-    """Convert texts of degrees, minutes and thousandths of a minute to degrees, negative for the sides S and W."""
+    """Convert texts of degrees, minutes and thousandths of a minute to degrees.
+
+    They are negative for the sides S and W.
+    """
     value = int(degrees) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
     return -value if side in "SW" else value
 
@@ -339,7 +344,7 @@ def _get_local_name(element: ElementTree.Element) -> str:
 
 
 def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Return the pairs of time and position of a KML track, as texts, and the number of elements without a partner.
+    """Return the pairs of time and position of a KML track, and the number of unpaired elements.
 
     A track has either all times before all positions, or each time before its position.  In the first case, LogError is
     raised if the numbers of times and positions differ.

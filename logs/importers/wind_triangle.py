@@ -16,7 +16,7 @@ _MIN_FRACTION = 0.5
 
 
 def estimate_wind(velocity: Samples, attitude: Samples, airspeed: Samples) -> Samples:
-    """Estimate the wind velocity to north and east, m/s, (k, 2), as the ground velocity minus the air velocity.
+    """Estimate the wind velocity to north and east, m/s, (k, 2): ground velocity minus air velocity.
 
     There is a row for each second in which the aircraft flew for more than half of the window `_WINDOW_S` around it;
     its wind is the mean over this window.  There are no rows if any input has fewer than two rows.

@@ -266,7 +266,7 @@ def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Fi
 
 
 def _add_legend_above(axes: Any, title: str, columns: int) -> None:
-    """Draw the legend at the top of a panel, and extend the vertical axis so that the legend hides no lines."""
+    """Draw the legend at the top of a panel, and extend the vertical axis to make space for it."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
     legend_fraction = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height

@@ -167,7 +167,10 @@ class Chart:
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
     def shown_axis_range(self) -> tuple[float, float]:
-        """Return the range of the horizontal axis: `axis_range`, or the range of all x values; (0, 1) without any."""
+        """Return the range of the horizontal axis: `axis_range`, or else the range of all x values.
+
+        It is (0, 1) without values.
+        """
         if self.axis_range is not None:
             return self.axis_range
         finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]
@@ -226,7 +229,9 @@ def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats
 
 
 def make_leg_marks(legs: NDArray[Any], axis_positions: Floats) -> tuple[tuple[float, str], ...]:
-    """Return a mark at the start of each leg: its position on the horizontal axis, and "leg" with its number.
+    """Return a mark at the start of each leg: its position on the horizontal axis, and its text.
+
+    The text is "leg" with the number of the leg.
 
     legs: number of the active leg in each row, as in messages to the user, (t,), t >= 1.
     axis_positions: position of each row on the horizontal axis, (t,).
@@ -359,14 +364,17 @@ def panel_json(panel: Panel) -> Json:
 
 @dataclass(frozen=True, slots=True)
 class LegendEntry:
-    """One line of a legend: its text, and the layers with this text; the sample is drawn like the first of them."""
+    """One line of a legend: its text, and the layers with this text.
+
+    The sample is drawn like the first of them.
+    """
 
     text: str
     layers: tuple[Layer, ...] = field(default=())
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Return the legend of panels: first an entry for each legend text of a layer, then one for each limit label.
+    """Return the legend entries of panels, first those of layers, then those of limits.
 
     Layers with the same legend text share an entry.  Layers without a name or without values have no entry.
     """

@@ -1,4 +1,4 @@
-"""Chart two flights together: on one map, over the distance flown, and an imported flight with its simulation."""
+"""Chart two flights together, or an imported flight and its simulation."""
 
 from dataclasses import dataclass, replace
 

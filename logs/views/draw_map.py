@@ -144,7 +144,9 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
 
 
 def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend_height: float = 0.0) -> None:
-    """Draw a compass with an arrow for each wind in the column right of the map, and a note on each wind below it.
+    """Draw a compass with an arrow for each wind, and notes on the winds below it.
+
+    They are in the column right of the map.
 
     column: left edge of the column, inches.
     legend_height: height of the legend below the map, inches; the notes stay above its upper edge.

@@ -61,7 +61,10 @@ class Projection:
     stretch: float
 
     def project(self, points: Floats) -> Floats:
-        """Project points (..., 3), m; return right, up and depth towards the viewer in the picture, m, (..., 3)."""
+        """Project points (..., 3), m, into the picture.
+
+        Return right, up and depth towards the viewer, m, (..., 3).
+        """
         east, north, up = np.moveaxis(points - self.center, -1, 0)
         cos_azimuth, sin_azimuth = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -sin_azimuth * east + cos_azimuth * north

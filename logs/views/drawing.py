@@ -98,9 +98,10 @@ _MAX_PANEL_TITLE_LINES = 2
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Replace the user's matplotlibrc by matplotlib's defaults and planfly's picture settings in a with block.
+    """Use planfly's picture settings instead of the user's matplotlibrc in a with block.
 
-    The previous settings are restored at the end of the block.
+    Settings that planfly does not state are matplotlib's defaults.  The previous settings are restored at the end of
+    the block.
 
     >>> with clean_style():
     ...     mpl.rcParams["font.size"]
@@ -167,7 +168,10 @@ def jpeg_bytes(png: bytes) -> bytes:
 
 
 def svg_bytes(figure: Figure) -> bytes:
-    """Render the figure as an SVG without a date, with letters as outlines; the same figure gives the same bytes."""
+    """Render the figure as an SVG without a date, with letters as outlines.
+
+    The same figure gives the same bytes.
+    """
     buffer = io.BytesIO()
     with _use_picture_settings():
         figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
@@ -419,7 +423,9 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
 
 
 def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
-    """Draw the layers of a panel in their order, and its limit lines above bands and areas but below other layers.
+    """Draw the layers of a panel in their order, and its limit lines between them.
+
+    The limit lines are above bands and areas, but below other layers.
 
     min_zorder: matplotlib's zorder of the lowest layer.
     """
@@ -545,7 +551,10 @@ def _make_ring_style(role_style: theme.RoleStyle) -> dict[str, Any]:
 
 
 def write_labels(axes: Any, panel: Panel) -> None:
-    """Write a panel's labels, the most important first, where they overlap neither each other nor paths if possible."""
+    """Write a panel's labels, the most important first.
+
+    They overlap neither each other nor the paths if possible.
+    """
     placer = LabelPlacer(axes)
     for layer in panel.layers:
         if layer.kind == "line" and layer.role in ("planned", "flown", "other"):
@@ -573,7 +582,10 @@ def write_label(placer: LabelPlacer, label: Label) -> None:
 
 
 def make_legend_handle(entry: LegendEntry) -> Any:
-    """Return matplotlib's legend handle for an entry: a patch, marker or line in the style of its first layer."""
+    """Return matplotlib's legend handle for an entry.
+
+    It is a patch, marker or line in the style of the entry's first layer.
+    """
     layer = entry.layers[0]
     role_style, text = theme.ROLE_STYLES[layer.role], textwrap.fill(entry.text, 36)
     if layer.kind in ("band", "area"):

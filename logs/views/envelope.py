@@ -60,7 +60,10 @@ class FlownMoments:
 
 
 def select_flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
-    """Return at most `count` moments of a flight, evenly spaced in the track's rows, without those with NaN values."""
+    """Return at most `count` moments of a flight, evenly spaced in the rows of its track.
+
+    Moments with NaN values are omitted.
+    """
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), count)).astype(np.intp))
     air_velocity = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
     east, north, up = air_velocity.T

@@ -1,4 +1,4 @@
-"""Find where on a route a verdict's rules failed, how charts name these places, and distances along the route."""
+"""Find where on a route rules failed, how charts name these places, and distances along the route."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -167,9 +167,9 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 def make_fail_labels(
     failed: Failures, corners: Floats, threat_positions: Mapping[int, tuple[float, float]]
 ) -> tuple[Label, ...]:
-    """Return a label with the names of the failing rules for each failing leg, threat and waypoint, in this order.
+    """Return a label with the names of the failing rules for each failing leg, threat and waypoint.
 
-    There are at most `_MAX_LABELS`; the rest is left out.
+    They are in this order.  There are at most `_MAX_LABELS`; the rest is left out.
 
     corners: positions of the route's waypoints in the chart, (w, 2).
     threat_positions: position of threats in the chart, keyed by index; other threats get no label.
@@ -193,7 +193,7 @@ def threat_radius(threats: Threats, place: Place) -> float:
 
 
 def find_rows_inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Return a mask (t,): True for rows of the track within the range of any threat for which a rule failed."""
+    """Return a mask (t,): True for rows of the track within the range of a threat that failed."""
     is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]

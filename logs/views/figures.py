@@ -1,4 +1,4 @@
-"""List the figures of a plan and its flight, for PNG files and for charts and captions of the HTML page.
+"""List the figures of a plan and its flight, for PNG files and for the HTML page.
 
 Each figure has a module (`logs.views.profile`, ...) that builds its view: a description as plain data, which
 matplotlib and the page both draw.  To add a figure, write its module and one entry here.
@@ -86,7 +86,7 @@ class FigureEntry:
 
 
 def _make_path_arguments(subject: Subject) -> dict[str, Any]:
-    """Return the keyword arguments that `flight_map` and `profile_chart` share: paths, verdict and numbering."""
+    """Return the arguments that `flight_map` and `profile_chart` share: paths, verdict, numbering."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -113,7 +113,9 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 
 
 def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> dict[str, View]:
-    """Build the views of simulated returns to launch, keyed by figure name; views without data are omitted.
+    """Build the views of simulated returns to launch, keyed by figure name.
+
+    Views without data are omitted.
 
     track: flown track; None if the returns start on the planned path.
     """
@@ -123,7 +125,10 @@ def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
 
 
 def _make_returns_view(name: str) -> Callable[[Subject], View | None]:
-    """Make a function that builds the view of one of the `RETURN_FIGURES`, or returns None without judged returns."""
+    """Make a function that builds the view of one of the `RETURN_FIGURES`.
+
+    It returns None if no returns were judged.
+    """
 
     def make_view(subject: Subject) -> View | None:
         """Build the figure's view; None if no returns were judged or there is nothing to draw."""
@@ -423,7 +428,9 @@ def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> d
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
-    """Render views as PNG files, 1500 pixels wide; return the bytes of each file, keyed by file name (`map.png`).
+    """Render views as PNG files, 1500 pixels wide.
+
+    Return the bytes of each file, keyed by file name (`map.png`).
 
     views: views keyed by figure name.
     svg: True to render each figure as an SVG file (`map.svg`), too.

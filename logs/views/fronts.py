@@ -84,7 +84,7 @@ def front_map(front: Front) -> MapChart:
 
 
 def front_chart(front: Front) -> Chart:
-    """Chart exposure, height above ground, energy and time of flight of each plan of a front over its length, km."""
+    """Chart exposure, height above ground, energy and time of each plan of a front over its length, km."""
     named_plans, plans = _find_best_plans(front), front.plans
     lengths = np.array([plan.length for plan in plans]) / 1e3
     other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])

@@ -1,4 +1,4 @@
-"""Map flight without an engine: lowest heights to glide home from, flat ground, and destinations within reach."""
+"""Map flight without an engine: heights to glide home from, flat ground, and reachable places."""
 
 import numpy as np
 

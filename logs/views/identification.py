@@ -1,4 +1,4 @@
-"""Chart an identification of an aircraft model: measured and predicted values of its equations and of a log."""
+"""Chart an identification: measured and predicted values of its equations, and of a log."""
 
 import numpy as np
 
@@ -11,7 +11,9 @@ _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/
 
 
 def equation_chart(equation: Equation) -> Chart:
-    """Chart measured and predicted values of an equation, and their difference, over the time of all log segments.
+    """Chart measured and predicted values of an equation, and their difference, over time.
+
+    The time is the time of all log segments joined together.
 
     >>> wave = np.sin(np.arange(500) / 20.0)
     >>> chart = equation_chart(Equation("pitch acceleration", "rad/s2", 25.0, wave, 0.9 * wave, 0.99, 0.1))

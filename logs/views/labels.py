@@ -129,7 +129,9 @@ class LabelPlacer:
             artist.set_path_effects([outline])
 
     def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
-        """Draw a thin line from a label to its point; it starts at the label's centre and is hidden below the label.
+        """Draw a thin line from a label to its point.
+
+        It starts at the label's centre and is hidden below the label.
 
         box, x, y: the label's box and its point, pixels.
         width: line width, typographic points.
@@ -163,10 +165,11 @@ class LabelPlacer:
         )
 
     def _compute_order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a label whose order among labels with near points is wrong; 0 if the order is right.
+        """Return the cost of a label whose order among labels with near points is wrong.
 
-        If a point is left of another point, but its label right of the other label, a reader could assign both labels
-        to the wrong points.  Framed labels need no such cost, because they have a line to their point.
+        It is 0 if the order is right.  If a point is left of another point, but its label right of the other label, a
+        reader could assign both labels to the wrong points.  Framed labels need no such cost, because they have a line
+        to their point.
 
         box: box of the label, pixels.
         x, y: point of the label, pixels.
@@ -183,7 +186,10 @@ class LabelPlacer:
         return cost
 
     def _compute_box_cost(self, box: Box) -> float:
-        """Return the cost of placing a label in a box: higher if the box leaves the axes or covers labels or lines."""
+        """Return the cost of placing a label in a box.
+
+        It is higher if the box leaves the axes or covers labels or lines.
+        """
         frame = self.axes.get_window_extent()
         cost = 0.0
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:

@@ -64,7 +64,7 @@ class DrawnLink:
 
 
 def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
-    """Compute the coverage of a radio link around a path, and collect the data for the pictures of the link.
+    """Compute the coverage of a radio link around a path, and collect the data for its pictures.
 
     Return None if the scenario has no link or no terrain, or the path has no positions.
 

@@ -272,7 +272,7 @@ def map_json(chart: MapChart) -> Json:
 
 
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
-    """Return the east and north range of a map that shows the scenario's area and all paths, with a margin, m.
+    """Return the range of a map that shows the scenario's area and all paths with a margin, m.
 
     A mission without a scenario has no area.  Its range contains the paths, and zones as far as they lie within the
     bounds that planfly chose around the mission.
@@ -300,7 +300,7 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
 
 
 def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-    """Return the names "start" and "destination" with their positions: ends of the route, else the scenario's."""
+    """Return the names and positions of start and destination: of the route, or else of the scenario."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
     return ("start", first), ("destination", last)
 

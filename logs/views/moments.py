@@ -1,4 +1,7 @@
-"""Collect the moments of a flight (thinned rows of its track), its place names and the aircraft model for the page."""
+"""Collect moments of a flight, names of its places, and the aircraft model for the page.
+
+A moment is a row of the track; a long track is thinned.
+"""
 
 from typing import Any
 
@@ -18,7 +21,7 @@ MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Return at most `MAX_MOMENTS` rows of a flight as JSON data for the page: a list of values for each column.
+    """Return at most `MAX_MOMENTS` rows of a flight as JSON data: a list of values for each column.
 
     The columns are time (s); east, north (m), up (m AMSL) and above (m above ground); airspeed and climb (m/s); bank
     (right positive), pitch and heading (degrees); and leg.  The key "legs" has the names of all legs.  Unknown values
@@ -71,7 +74,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
-    """Return a text on each waypoint of the route: its name with its mission item, and below that its altitude."""
+    """Return a text on each waypoint of the route: its name with its item, and its altitude."""
     heights, numbers = setup.display_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
         f"{place_text(Place('waypoint', k, item=_get_item(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"

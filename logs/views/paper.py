@@ -1,4 +1,4 @@
-"""Draw figures of the paper's experiment: paths of many searches, one path for each encoding, and convergence.
+"""Draw figures of the paper's experiment: paths of searches, paths of encodings, convergence.
 
 The paper is Yang, Tang and Lozano 2014.
 """
@@ -63,7 +63,7 @@ class PaperPath:
 
 
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
-    """Draw the paths that an algorithm found over contours, missile and radar circles, as in the paper's Figs. 5-8.
+    """Draw the paths that an algorithm found over contours and threats, as in the paper's Figs. 5-8.
 
     The legend states the path length ratio (PLR): path length divided by the straight line from start to destination.
 
@@ -124,7 +124,9 @@ def draw_encodings(scenario: Scenario, path_by_encoding: Mapping[str, PaperPath]
 
 
 def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: float) -> tuple[Figure, Any, list[Any]]:
-    """Make a map with ground and threats; return the figure, its axes, and the legend handles of ground and threats.
+    """Make a map with ground and threats.
+
+    Return the figure, its axes, and the legend handles of ground and threats.
 
     legend_height: height left free below the map for the legend, inches.
     """
@@ -160,9 +162,10 @@ def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[A
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
-    """Draw the number of searches with a safe path, and the length ratios of the safe paths, over generations.
+    """Draw the number of searches with a safe path, and the length ratios of these paths.
 
-    There is a column of panels for each number of threats, and a line for each algorithm.
+    Both are drawn over the generations.  There is a column of panels for each number of threats, and a line for each
+    algorithm.
 
     histories: histories of searches, keyed by number of threats and by algorithm: ``histories[30]["umda"]`` has one
         array (g, 3) for each search.  Its rows are generations; its columns are length ratio, kill exposure and

@@ -1,4 +1,4 @@
-"""Chart the profile of a flight: terrain, plan, track and threats in the vertical plane along the path."""
+"""Chart the profile of a flight: terrain, plan, track and threats in the plane along the path."""
 
 from collections.abc import Sequence
 
@@ -179,7 +179,10 @@ def _compute_planned_altitudes(
 
 
 def terrain_altitudes(scenario: Scenario, points: Floats) -> Floats | None:
-    """Return the terrain elevation under points (s, 3), m AMSL, (s,); None if it is unknown at all of them."""
+    """Return the terrain elevation under points (s, 3), m AMSL, (s,).
+
+    Return None if it is unknown at all of them.
+    """
     if scenario.terrain is None:
         return None
     heights = scenario.terrain.height(points[:, 0], points[:, 1])
@@ -214,7 +217,7 @@ def _choose_altitude_limits(
 
 
 def make_ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
-    """Return layers of the terrain, of the required clearance above it, and of the maximum height above ground.
+    """Return layers of terrain, required clearance above it, and maximum height above ground.
 
     A limit that the scenario does not set has no layer.  Return [] without terrain.
     """
@@ -239,7 +242,7 @@ def make_ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
 def _make_flown_layers(
     scenario: Scenario, route: Floats, track: Track | None, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return layers of the flown altitudes and of the threats that failed, and label positions of these threats.
+    """Return layers of the flown altitudes and of threats that failed, and label positions.
 
     The label positions are keyed by the index of the threat.
 
@@ -269,7 +272,9 @@ def _make_flown_layers(
 def _make_waypoint_labels(
     waypoint_distances: Floats, route: Floats, stops: Sequence[int], numbers: Sequence[int], failed: Failures
 ) -> list[Label]:
-    """Return labels with the numbers of waypoints: about `_MAX_NUMBERS` at most, and of all that fail a rule.
+    """Return labels with the numbers of at most about `_MAX_NUMBERS` waypoints.
+
+    All waypoints that fail a rule are labelled, too.
 
     waypoint_distances: distance of each waypoint along the route, m, (w,).
     stops: number of the stop to which each waypoint belongs, (w,).

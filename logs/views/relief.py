@@ -6,9 +6,9 @@ from world.arrays import Floats
 
 
 def relief(heights: Floats, spacing: float, span: float) -> Floats:
-    """Return the brightness of a map's ground lit from the north-west, (rows, columns): 0.55 in shade to 1.0 in light.
+    """Return the brightness of ground lit from the north-west: 0.55 in shade to 1.0 in light.
 
-    Unknown heights (NaN) are replaced by the mean height.
+    The result is (rows, columns).  Unknown heights (NaN) are replaced by the mean height.
 
     heights: heights on a grid, m, (rows, columns); rows from south to north, columns from west to east.
     spacing: distance between rows, and between columns, m.

@@ -1,4 +1,4 @@
-"""Chart simulated returns to launch: path by outcome, profiles of the worst returns, and lowest safe altitudes.
+"""Chart simulated returns to launch: outcome along the path, worst returns, lowest safe altitudes.
 
 A return, here, is a simulated return to launch that starts at a point of the flown or planned path.
 """
@@ -93,7 +93,9 @@ def path_layers(
     position_of: Callable[[Element], tuple[float, float]],
     text_of: Callable[[Element], str],
 ) -> list[Layer]:
-    """Return line layers of a path whose segments are coloured by their key, one layer for each role and name.
+    """Return line layers of a path whose segments are coloured by their key.
+
+    There is one layer for each role and name.
 
     segments: key and points of each segment of the path.
     roles_and_names: role and legend text of each key, in the order of the layers.
@@ -257,7 +259,7 @@ def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Char
 
 
 def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> Chart | None:
-    """Chart over time the path's altitude, the lowest safe altitude for a return, and altitude to spare of glides.
+    """Chart altitude, lowest safe altitude for a return, and altitude to spare of glides over time.
 
     The path's altitude is coloured by the outcome of a return from there.  Return None if no returns were judged.
 

@@ -95,7 +95,7 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
 
 
 def select_drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
-    """Select at most `max_rows` rows of a track that have a position, evenly, including the first and the last.
+    """Select at most `max_rows` rows of a track that have a position, evenly, with first and last row.
 
     Return the indices of the rows.
     """

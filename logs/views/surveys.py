@@ -21,9 +21,10 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Chart each survey of a flight in its own panel, from above, rotated so that its lines are horizontal.
+    """Chart each survey of a flight in its own panel, from above.
 
-    Return None if the mission has no survey that is judged, or if the track cannot be aligned with the route.
+    It is rotated so that its lines are horizontal.  Return None if the mission has no survey that is judged, or if the
+    track cannot be aligned with the route.
     """
     if not judged_surveys(setup):
         return None

@@ -1,4 +1,4 @@
-"""Describe threats and zones as layers of a map (their outlines) and of a profile (their vertical sections)."""
+"""Describe threats and zones as layers of a map (outlines) and of a profile (vertical sections)."""
 
 from dataclasses import dataclass
 
@@ -101,9 +101,10 @@ def threat_labels(threats: Threats, labelled_elsewhere: frozenset[int] = frozens
 
 
 def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floats | None) -> Floats:
-    """Return the radius of missile spheres at the altitude of the route's horizontally nearest point, m, (k,).
+    """Return the radius of missile spheres at the altitude of the nearest point of the route, m, (k,).
 
-    It is 0 if the route passes above or below the sphere; without a route it is the sphere's radius.
+    The nearest point is the horizontally nearest.  It is 0 if the route passes above or below the sphere; without a
+    route it is the sphere's radius.
 
     indices: indices of the missiles, (k,).
     route: waypoints, m, (w, 3); None without a route.
@@ -122,7 +123,7 @@ def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floa
 
 
 def cut_sphere(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
-    """Return the altitudes of a sphere's lower and upper surface below and above points, m AMSL, (s,) each.
+    """Return the altitudes of a sphere's lower and upper surface at points, m AMSL, (s,) each.
 
     Both are NaN at points horizontally outside the sphere.
 
@@ -194,9 +195,9 @@ class PathPlane:
 def threat_cuts(
     threats: Threats, plane: PathPlane, labelled_elsewhere: frozenset[int]
 ) -> tuple[list[Layer], list[Label]]:
-    """Cut the spheres of missiles and radars by a vertical plane; return a layer of each section, and the labels.
+    """Cut the spheres of missiles and radars by a vertical plane.
 
-    Radars come first.  At most `_MAX_CUT_NAMES` threats are labelled.
+    Return a layer of each section, and the labels.  Radars come first.  At most `_MAX_CUT_NAMES` threats are labelled.
 
     labelled_elsewhere: indices of threats with their own labels.
     """
@@ -230,9 +231,10 @@ def threat_cuts(
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Cut the spheres of failing threats by a vertical plane; return a layer of each section, and label positions.
+    """Cut the spheres of failing threats by a vertical plane.
 
-    The label positions (km, m AMSL) are keyed by the index of the threat; threats without a visible outline have none.
+    Return a layer of each section, and label positions.  The label positions (km, m AMSL) are keyed by the index of the
+    threat; threats without a visible outline have none.
     """
     layers, label_positions = [], {}
     for place in failed.threats:
@@ -276,7 +278,10 @@ def _format_level(level: ZoneLevel) -> str:
 
 
 def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
-    """Return a layer of each zone from above: an exclusion zone as an area with holes, an inclusion zone as a line."""
+    """Return a layer of each zone from above.
+
+    An exclusion zone is an area with holes, an inclusion zone a line.
+    """
     layers = []
     for zone in zones:
         gap = np.full((1, 2), np.nan)
@@ -292,9 +297,10 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
 
 
 def zone_labels(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
-    """Return a label with the name and the altitude band of each zone; none for more than `_MAX_ZONE_NAMES` zones.
+    """Return a label with the name and the altitude band of each zone.
 
-    It is at the center of an exclusion zone, and at the northernmost corner of an inclusion zone.
+    There are none for more than `_MAX_ZONE_NAMES` zones.  It is at the center of an exclusion zone, and at the
+    northernmost corner of an inclusion zone.
     """
     if len(zones) > _MAX_ZONE_NAMES:
         return ()
@@ -349,9 +355,9 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
-    """Return a layer of each part of a vertical plane that a zone forbids, and labels of the exclusion zones.
+    """Return a layer of each part of a vertical plane that a zone forbids, and labels of zones.
 
-    At most `_MAX_CUT_NAMES` parts are labelled.
+    Only exclusion zones are labelled.  At most `_MAX_CUT_NAMES` parts are labelled.
     """
     layers, labels = [], []
     for cut in zone_cuts(zones, plane):

@@ -173,10 +173,10 @@ def _sum_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales
 
 
 def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Chart the exposure to kill and to detection, as a rate and summed over time, over the distance flown (km).
+    """Chart the exposure to kill and to detection over the distance flown (km).
 
-    An exposure that was zero throughout has no panels.  Return None if both were zero or the track has fewer than two
-    known positions.
+    It is shown as a rate and summed over time.  An exposure that was zero throughout has no panels.  Return None if
+    both were zero or the track has fewer than two known positions.
     """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:

@@ -41,7 +41,7 @@ class PlaceValue:
 
 
 def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """Return the values of a rule's findings on waypoints and legs, sorted by the number of the waypoint or leg."""
+    """Return the values of a rule's findings on waypoints and legs, sorted by their number."""
     place_rows = []
     for finding in findings:
         place = finding.place
@@ -56,10 +56,11 @@ def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
-    """Chart turns, slopes, clearances, waypoint distances and corridor; each has a panel if the verdict judged it.
+    """Chart turns, slopes, clearances, waypoint distances and corridor.
 
-    Bars are planned values, dots flown values, dashes limits; rings mark failures.  Limits of turns and of the corridor
-    that are far above all values are not drawn; a note states the lowest of them.
+    Each has a panel if the verdict judged it.  Bars are planned values, dots flown values, dashes limits; rings mark
+    failures.  Limits of turns and of the corridor that are far above all values are not drawn; a note states the lowest
+    of them.
 
     name: name of the scenario.
 

@@ -1,4 +1,4 @@
-"""Check the quantities of a table of columns against each other, to find wrong signs, frames, units and clocks."""
+"""Check the quantities of a log against each other, to find wrong signs, frames, units and clocks."""
 
 import math
 from collections.abc import Iterator
@@ -260,7 +260,10 @@ def _list_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
 
 
 def _find_ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
-    """Return the ground velocity at the times of a grid as north + i east, m/s, (n,); None if the log lacks it."""
+    """Return the ground velocity at the times of a grid as north + i east, m/s, (n,).
+
+    Return None if the log lacks it.
+    """
     if log.has("velocity_north", "velocity_east"):
         north, east = (_average_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east"))
         return np.asarray(north + 1j * east)

@@ -1,4 +1,4 @@
-"""Read the quantities of a flight log as its table of columns describes them, in SI units and radians on one clock."""
+"""Read quantities of a flight log by its table of columns, in SI units and rad on one clock."""
 
 import hashlib
 import math
@@ -118,7 +118,7 @@ class ColumnLog:
         return all(quantity in named or self._is_from_quaternion(quantity) for quantity in quantities)
 
     def _is_from_quaternion(self, quantity: str) -> bool:
-        """Return True for roll, pitch or yaw that must be computed from the quaternion because it has no column."""
+        """Return True for an angle that must be computed from the quaternion, as it has no column."""
         named = self.table.columns.keys()
         return quantity in ANGLES and quantity not in named and named >= set(QUATERNION)
 
@@ -186,7 +186,10 @@ class ColumnLog:
         return Series(time, factor * angles[angle]() + offset)
 
     def raw_values(self, quantity: str) -> tuple[Floats, Column]:
-        """Return the times (s) and the unconverted values of a quantity's first entry, such as the names of modes."""
+        """Return the times (s) and the unconverted values of a quantity's first entry.
+
+        The values may be texts, such as names of modes.
+        """
         entry = self.table.columns[quantity][0]
         clock = self._get_clock(entry.clock)
         return self._align_times(entry.clock), self._find_column_on_clock(
@@ -256,7 +259,9 @@ class ColumnLog:
         return self._clocks[name]
 
     def _read_clock(self, name: str, clock: ClockTable) -> _Clock:
-        """Read the times of a clock; without a column of times, compute them from the number of rows and the rate.
+        """Read the times of a clock.
+
+        Without a column of times, compute them from the number of rows and the rate.
 
         Raises LogError for missing or decreasing times, fewer than two different times, too long a log, and a stated
         rate that contradicts the times.
@@ -313,9 +318,10 @@ class ColumnLog:
 
     @cached_property
     def start(self) -> float:
-        """Time on the main clock that becomes time 0, s: its first time if the clock counts from 1970, otherwise 0.
+        """Time on the main clock that becomes time 0, s.
 
-        In the first case, `utc_start` is set to it.
+        It is the clock's first time if the clock counts from 1970, otherwise 0.  In the first case, `utc_start` is set
+        to it.
         """
         first = float(self._get_clock(self._main_clock).time[0])
         if first > _UTC_AFTER_S:
@@ -349,10 +355,10 @@ class ColumnLog:
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
     def _align_clock(self, name: str) -> float:
-        """Return the shift that aligns a clock with the main clock, to be added to its times, s; 0 without `align`.
+        """Return the shift that aligns a clock with the main clock, to be added to its times, s.
 
-        At this shift, the two signals that `align` names correlate best.  Raises LogError if their correlation is too
-        small at every shift.
+        It is 0 without `align`.  At this shift, the two signals that `align` names correlate best.  Raises LogError if
+        their correlation is too small at every shift.
         """
         align = self.table.clocks[name].align
         if align is None:
@@ -414,7 +420,7 @@ class ColumnLog:
         return values
 
     def _locate_column(self, data: DataFile, name: str) -> str:
-        """Return the path of a data file and the name of a column, with which a message about the column starts."""
+        """Return the path of a data file and the name of a column, as the start of a message."""
         return f"{data.path}: {name}"
 
     def _read_entry(self, quantity: str, entry: ColumnTable) -> Series:
@@ -473,7 +479,7 @@ class ColumnLog:
         return np.asarray(frame_factor * (factor * scaled + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
 
     def _check_plausible(self, quantity: str, entry: ColumnTable, values: Floats) -> None:
-        """Raise LogError if an entry has no values, or too many of them are outside the quantity's plausible range.
+        """Raise LogError if an entry has no values, or too many of them are implausible.
 
         The message names the unit in which they would be plausible, if there is one.
 

@@ -91,9 +91,10 @@ def _read_joined_series(log: ColumnLog, *quantities: str) -> Samples:
 
 
 def join_series(parts: list[Series]) -> Samples:
-    """Join k series as the columns of one series at the times of the longest, with linear interpolation, (n, k).
+    """Join k series as the columns of one series at the times of the longest, (n, k).
 
-    Rows with a missing value are left out.  There are no rows if a series to be interpolated has fewer than two values.
+    Shorter series are interpolated linearly.  Rows with a missing value are left out.  There are no rows if a series to
+    be interpolated has fewer than two values.
     """
     longest = max(parts, key=lambda part: len(part.time))
     columns = []
@@ -109,7 +110,10 @@ def join_series(parts: list[Series]) -> Samples:
 
 
 def _read_attitude(log: ColumnLog) -> Samples:
-    """Read roll, pitch and yaw, without jumps at full turns, rad, (n, 3); no rows if the table lacks one of them."""
+    """Read roll, pitch and yaw, without jumps at full turns, rad, (n, 3).
+
+    There are no rows if the table lacks one of them.
+    """
     attitude = _read_joined_series(log, "roll", "pitch", "yaw")
     return Samples(attitude.time, np.unwrap(attitude.values, axis=0)) if len(attitude.time) else attitude
 

@@ -1,6 +1,7 @@
-"""Read and check a table of columns: a TOML file that states which column of which data file has each quantity.
+"""Read and check a table of columns.
 
-Each class stands for one part of the file; square brackets show its place in the file.
+It is a TOML file that states which column of which data file has each quantity.  Each class stands for one part of the
+file; square brackets show its place in the file.
 """
 
 from collections.abc import Iterable
@@ -56,7 +57,10 @@ class ClockTable(_Table):
 
 
 class ConditionTable(_Table):
-    """The condition ``when`` of a column: only rows in which another column of its clock has this value are used."""
+    """The condition ``when`` of a column.
+
+    Only rows in which another column of its clock has this value are used.
+    """
 
     column: str
     value: float | str
@@ -135,7 +139,7 @@ class LogTable(_Table):
 
     @model_validator(mode="after")
     def _check_entries(self) -> "LogTable":
-        """Raise ValueError for an unknown quantity, unit, frame or clock, and for inconsistent clocks or time spans."""
+        """Raise ValueError for an unknown quantity, unit, frame or clock, and for inconsistent entries."""
         for quantity, entries in self.columns.items():
             if quantity not in QUANTITIES:
                 known = did_you_mean(quantity, QUANTITIES) or f": expected one of {', '.join(QUANTITIES)}"

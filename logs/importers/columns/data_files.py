@@ -75,7 +75,9 @@ def read_data_file(path: Path) -> DataFile:
 
 
 def _read_csv(path: Path) -> DataFile:
-    """Read a CSV file with a header line; remarks may precede the header, and a line with units may follow it.
+    """Read a CSV file with a header line.
+
+    Remarks may precede the header, and a line with units may follow it.
 
     Raises LogError for a file without rows or without column names, for two columns with the same name, and for rows
     with another number of cells than the header.
@@ -186,10 +188,10 @@ def _list_mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tup
 
 
 def _list_array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
-    """Yield the name and the values of each column of an array; nothing for an array of more than two dimensions.
+    """Yield the name and the values of each column of an array.
 
-    A number or an array of one dimension is one column.  In a matrix, rows are along the longer axis, unless the number
-    of titles shows which axis has the columns.
+    An array of more than two dimensions yields nothing.  A number or an array of one dimension is one column.  In a
+    matrix, rows are along the longer axis, unless the number of titles shows which axis has the columns.
 
     name: name of the array, with which the names of a matrix's columns start.
     titles: names of a matrix's columns; None or [] if unknown.

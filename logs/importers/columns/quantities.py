@@ -1,4 +1,4 @@
-"""Define the quantities that a table of columns can name, with their units, frames and plausible ranges."""
+"""Define the quantities in a table of columns, with their units, frames and plausible ranges."""
 
 import math
 from typing import NamedTuple
@@ -143,7 +143,9 @@ def to_default_frame(quantity: str, frame: str) -> tuple[float, float]:
 
 
 def find_likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
-    """Return the first other unit in which the numbers of a quantity would be plausible; "" if there is none.
+    """Return the first other unit in which the numbers of a quantity would be plausible.
+
+    Return "" if there is none.
 
     unit: unit in which the numbers were read.
     magnitude: size of a typical number in the data.

@@ -209,7 +209,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 
 
 def _encode_message(letter: bytes, body: bytes) -> bytes:
-    """Encode one message of a ULog file: the length of its content, the letter of its type, and its content."""
+    """Encode one message of a ULog file: length of the content, letter of the type, and content."""
     return struct.pack("<H", len(body)) + letter + body
 
 
@@ -327,7 +327,7 @@ def _make_battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, C
 
 
 def _make_mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
-    """Make the topic navigator_mission_item, with one message for each item at the time at which it becomes active.
+    """Make the topic navigator_mission_item, with a message when each item becomes active.
 
     Items without a position get the time of the next item with a position, and the position 0, 0.  They are not
     omitted, because a gap in the numbers would look like lost items.

@@ -55,7 +55,7 @@ class MapLine:
 
 
 def plan_line(setup: FlightSetup) -> MapLine:
-    """Return the planned route as a line, each waypoint named by its number and its mission item as in a verdict.
+    """Return the planned route as a line whose points are named by waypoint and mission item.
 
     >>> from logs.recording.example_log import example_log
     >>> line = plan_line(example_log().setup)

@@ -73,7 +73,10 @@ def telemetry_bytes(log: FlightLog) -> bytes:
 
 
 def _make_flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
-    """Yield each message that the vehicle sends during the flight, with its time, s; times do not decrease."""
+    """Yield each message that the vehicle sends during the flight, with its time, s.
+
+    The times do not decrease.
+    """
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
     start = snapshots.start_snapshot(setup)

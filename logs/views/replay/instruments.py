@@ -173,7 +173,7 @@ class Instruments:
         ]
 
     def _format_control_lines(self, row: int, bar_width: int) -> list[str]:
-        """Return a line for each control: a bar that shows its position (O) and its command (|) between its limits.
+        """Return a line for each control: a bar with its position (O) and its command (|) between its limits.
 
         The bar of a surface without a limit ends at 30° on either side.
 

@@ -1,4 +1,4 @@
-"""Render the frames of a movie of a flight: the map, the aircraft with its trail, and a line of numbers.
+"""Render the frames of a movie of a flight: the map, the aircraft and its trail, and numbers.
 
 Frames depend only on the log and the speed of the movie, not on the clock.  The map is drawn once; each frame adds the
 moving parts.
@@ -127,7 +127,7 @@ class _MovingParts:
         self._step = max(1, len(position) // _MAX_TRAIL_POINTS)
 
     def show(self, time: float) -> None:
-        """Draw the aircraft and its numbers in the track's last row at or before a flight time, s, and the trail."""
+        """Draw trail, aircraft and numbers in the track's last row at or before a flight time, s."""
         track = self._track
         k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
         rows = np.append(np.arange(0, k, self._step), k)

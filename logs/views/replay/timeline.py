@@ -1,4 +1,4 @@
-"""List the timeline of a recorded flight: legs, turns, clearances, threats and events in order of time.
+"""List the timeline of a recorded flight: legs, turns, clearances, threats and events.
 
 Legs and clearances are computed from the track, the route, the terrain and the threats in the log; recorded legs,
 clearances and verdicts are not used.
@@ -210,9 +210,10 @@ def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEnt
 
 
 def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """Make an entry for each change to the next leg: the angle by which the route turns, and the peak bank.
+    """Make an entry for each change to the next leg: angle of the turn, and peak bank.
 
-    The peak bank is the largest bank between the middles of the two legs.  Corners within a loiter have no entries.
+    The angle is the one by which the route turns.  The peak bank is the largest bank between the middles of the two
+    legs.  Corners within a loiter have no entries.
 
     parts: rows flown on each leg, in order of time.
     """
@@ -236,9 +237,10 @@ def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEn
 
 
 def _list_clearance_entries(log: FlightLog, rows_by_leg: list[_LegRows]) -> list[TimelineEntry]:
-    """Make an entry for the lowest height above ground on each leg, which says if it is below the required clearance.
+    """Make an entry for the lowest height above ground on each leg.
 
-    The legs around a loiter share one entry.  Without terrain, the only entry says so.
+    It says if this height is below the required clearance.  The legs around a loiter share one entry.  Without terrain,
+    the only entry says so.
 
     rows_by_leg: rows flown on each leg, in order of time.
     """

@@ -173,7 +173,7 @@ def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[
 
 
 def _list_difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
-    """Return notes on differences between the setups, on missing quantities, and on the distance between the tracks."""
+    """Return notes on differences of the setups, missing quantities, and the tracks' distance."""
     first_setup, second_setup = first.setup, second.setup
     notes = []
     for name, first_value, second_value in (

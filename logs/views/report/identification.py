@@ -1,4 +1,4 @@
-"""Write the page of an identification of an aircraft model: fits of equations, parameters, and uncertain quantities."""
+"""Write the page of an identification: fits of equations, parameters, and uncertain quantities."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -86,7 +86,7 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
 
 
 def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
-    """Return a row for each quantity that the identification keeps fixed: its name, and a text on its influence.
+    """Return a row for each quantity that the identification keeps fixed: name and influence.
 
     The text lists the `count` parameters that change most if the quantity changes by one standard deviation, with their
     changes.

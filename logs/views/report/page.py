@@ -152,7 +152,10 @@ class PageLibrary:
 
 @cache
 def _load_templates(package: str) -> Environment:
-    """Return a Jinja environment for a package's folder ``templates``; an undefined name in a template is an error."""
+    """Return a Jinja environment for a package's folder ``templates``.
+
+    An undefined name in a template is an error.
+    """
     return Environment(
         loader=PackageLoader(package),
         autoescape=True,
@@ -343,7 +346,10 @@ def _render_page(
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Convert views to JSON data for the page's scripts, keyed by figure name; charts without panels are omitted."""
+    """Convert views to JSON data for the page's scripts, keyed by figure name.
+
+    Charts without panels are omitted.
+    """
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 

@@ -120,7 +120,10 @@ def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
 
 
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
-    """Return a sentence on distance, time, lowest height above ground and energy of a flight; "" without a track."""
+    """Return a sentence on distance, time, lowest height above ground and energy of a flight.
+
+    Return "" without a track.
+    """
     if track is None:
         return ""
     seconds = float(track.time[-1] - track.time[0])
@@ -277,9 +280,10 @@ def mission_notes(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Return names and texts of facts on the battery: energy left, peak current, mean power, energy per kilometre.
+    """Return facts on the battery: energy left, peak current, mean power, energy per kilometre.
 
-    The energy used is part of `flight_sentence`.  Return [] without a track, or if its energy is unknown.
+    Each fact is a name and a text.  The energy used is part of `flight_sentence`.  Return [] without a track, or if its
+    energy is unknown.
     """
     if track is None or len(track) == 0:
         return []
@@ -322,9 +326,9 @@ PASSAGE_COLUMNS = ("unit", "reach", "entered (s)", "left (s)", "inside (s)", "cl
 
 
 def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """Return a row for each stay inside the sphere of a missile or radar, in order of time; [] without a track.
+    """Return a row for each stay inside the sphere of a missile or radar, in order of time.
 
-    Rows have the columns of `PASSAGE_COLUMNS`.
+    Return [] without a track.  Rows have the columns of `PASSAGE_COLUMNS`.
     """
     if track is None or len(track) == 0:
         return []
@@ -350,7 +354,7 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
 
 
 def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """Return a row for each control: name, limit, largest command, and time at the limit in s and in % of the flight.
+    """Return a row for each control: name, limit, largest command, and time at the limit (s, %).
 
     Return [] without a track or for fewer than two rows.  The cells that an unknown limit leaves open contain
     `NOTHING`.

@@ -17,7 +17,7 @@ _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)"
 
 
 def refly_lines(reflight: Reflight) -> list[str]:
-    """Return lines with tables of legs and turns, as flown and as simulated, and a line on how well the model fits.
+    """Return tables of legs and turns, as flown and as simulated, and the fit of the model, as lines.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -49,7 +49,7 @@ def refly_lines(reflight: Reflight) -> list[str]:
 
 
 def describe_model_trust(reflight: Reflight) -> str:
-    """Return a line on how far an imported flight differs from its simulation, and with which model it was compared."""
+    """Return a line on how far an imported flight differs from its simulation by a model."""
     model = reflight.setup.aircraft
     model_text = f"{model}, used because no aircraft was named," if reflight.stands_in else model
     if not reflight.spreads:
