@@ -284,10 +284,10 @@ def shorten(text: str, length: int) -> str:
     return text if len(text) <= length else text[: length - 1].rstrip() + "…"
 
 
-def numbers(values: Iterable[float], digits: int) -> list[float | None]:
+def json_numbers(values: Iterable[float], digits: int) -> list[float | None]:
     """Round values to `digits` decimals for JSON, and replace non-finite values by None.
 
-    >>> numbers([1.26, math.nan], 1)
+    >>> json_numbers([1.26, math.nan], 1)
     [1.3, None]
     """
     rounded = np.round(np.asarray(values, dtype=np.float64), digits) + 0.0
@@ -336,10 +336,10 @@ def panel_json(panel: Panel) -> Json:
             continue
         document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
         if layer.flight is None:
-            document["x"] = numbers(layer.x, screen_decimals(layer.x))
-            document["y"] = numbers(layer.y, screen_decimals(layer.y))
+            document["x"] = json_numbers(layer.x, screen_decimals(layer.x))
+            document["y"] = json_numbers(layer.y, screen_decimals(layer.y))
         if layer.lower_edge is not None:
-            document["low"] = numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
+            document["low"] = json_numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
         optional_keys: Json = {
             "dashed": layer.dashed,
             "quiet": layer.quiet,
@@ -357,8 +357,8 @@ def panel_json(panel: Panel) -> Json:
         "note": panel.note,
         "limits": [[label, round(value, 4)] for label, value in panel.limits if math.isfinite(value)],
         "layers": layers,
-        "labels": [[label.text, *numbers((label.x, label.y), 3), label.role] for label in labels],
-        "span": numbers(panel.shown_span(), 4),
+        "labels": [[label.text, *json_numbers((label.x, label.y), 3), label.role] for label in labels],
+        "span": json_numbers(panel.shown_span(), 4),
     }
 
 

@@ -16,7 +16,7 @@ from flight.simulation.track import Track
 from logs import theme
 from logs.views.charts import Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
 from logs.views.drawing import WIDTH, clean_style, draw_legend, make_legend_handle, new_figure, write_label
-from logs.views.failures import Failures, route_distance, route_samples, stop_rows
+from logs.views.failures import Failures, route_distance, route_samples, stop_start_indices
 from logs.views.labels import LabelPlacer
 from logs.views.scene import GroundGrid, SceneView, exaggeration, ground_grid, scene_bounds, select_drawn_rows
 from world.airspace.zones_on_map import zone_walls
@@ -401,7 +401,7 @@ def _draw_labels(
     # The same words as on the map.
     for k, name in ((0, "start"), (last, "destination")):
         write(name if items[k] == NO_ITEM else f"{items[k]} {name}", corners[k], "end")
-    stop_starts = stop_rows(setup.route.stops.tolist())
+    stop_starts = stop_start_indices(setup.route.stops.tolist())
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
     for k in sorted(k for k in numbered_waypoints - {0, last} if items[k] != NO_ITEM):

@@ -59,7 +59,7 @@ class Failures:
         return {place.index or 0: place_text(place) for place in radars_first}
 
 
-def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
+def collect_failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
     """Collect the failures of a verdict by place; none without a verdict.
 
     waypoint_count: number of waypoints of the route; failures at higher leg or waypoint numbers are ignored.
@@ -91,14 +91,14 @@ def _collect_failed_rules(failed_findings: list[Finding], kind: PlaceKind, count
     return {number: tuple(rules) for number, rules in sorted(rules_by_place.items())}
 
 
-def stop_rows(stops: Sequence[int]) -> list[int]:
+def stop_start_indices(stops: Sequence[int]) -> list[int]:
     """Return the index of the first waypoint of each stop.
 
     A stop is a place of the mission that has a number in messages; a loiter is one stop with several waypoints.
 
     stops: number of the stop to which each waypoint belongs, in flying order.
 
-    >>> stop_rows([0, 1, 1, 1, 2])
+    >>> stop_start_indices([0, 1, 1, 1, 2])
     [0, 1, 4]
     """
     return [k for k in range(len(stops)) if k == 0 or stops[k] != stops[k - 1]]

@@ -17,7 +17,7 @@ from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
-from logs.views.failures import failures
+from logs.views.failures import collect_failures
 from logs.views.glides import glide_chart
 from logs.views.link import DrawnLink, compute_scenario_link, link_chart, link_map
 from logs.views.map import MapChart, flight_map, map_json
@@ -196,7 +196,7 @@ FIGURES = (
         "scene",
         "3-D view",
         lambda subject: SceneView(
-            subject.setup, subject.track, failures(subject.verdict, len(subject.setup.route.points))
+            subject.setup, subject.track, collect_failures(subject.verdict, len(subject.setup.route.points))
         ),
         alternative=lambda subject: f"View from the side: {subject.contents_text}",
         caption=_make_fixed_caption(

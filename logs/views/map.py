@@ -9,8 +9,24 @@ import numpy as np
 from flight.mission.itinerary import NO_ITEM
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import NUMBERED_ITEM, NUMBERED_WAYPOINT, Json, Label, Layer, Panel, numbers, panel_json, shorten
-from logs.views.failures import failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
+from logs.views.charts import (
+    NUMBERED_ITEM,
+    NUMBERED_WAYPOINT,
+    Json,
+    Label,
+    Layer,
+    Panel,
+    json_numbers,
+    panel_json,
+    shorten,
+)
+from logs.views.failures import (
+    collect_failures,
+    find_rows_inside_threats,
+    make_fail_labels,
+    paths_differ,
+    stop_start_indices,
+)
 from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
@@ -142,9 +158,9 @@ def map_chart(
     winds: winds shown at the compass.
     """
     route = route_waypoints if route_waypoints is not None else plan_waypoints
-    failed = failures(verdict, len(route) if route is not None else 0)
+    failed = collect_failures(verdict, len(route) if route is not None else 0)
     stops = range(0 if route is None else len(route)) if stops is None else stops
-    stop_starts = stop_rows(stops)
+    stop_starts = stop_start_indices(stops)
     tracks = [drawn_track for drawn_track in tracks if len(drawn_track.track)]
     failing_threats = failed.threat_names()
     layers: list[Layer] = []
@@ -265,8 +281,8 @@ def map_json(chart: MapChart) -> Json:
     """
     return {
         "origin": chart.origin,
-        "east": numbers(chart.east, 1),
-        "north": numbers(chart.north, 1),
+        "east": json_numbers(chart.east, 1),
+        "north": json_numbers(chart.north, 1),
         **{name: value for name, value in panel_json(chart.panel).items() if name in ("layers", "labels")},
     }
 

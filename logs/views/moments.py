@@ -13,7 +13,7 @@ from flight.simulation.track import Track
 from logs.recording.foxglove_scene import MODEL_SPAN_M, model_colours, model_corners
 from logs.verdict.places import Place
 from logs.verdict.wording import place_text
-from logs.views.charts import numbers
+from logs.views.charts import json_numbers
 from logs.views.scene import select_drawn_rows
 
 # Largest number of moments of a flight in a page.
@@ -44,16 +44,16 @@ def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", rol
     return {
         "name": name,
         "role": role,
-        "time": numbers(track.time[rows], 2),
-        "east": numbers(east, 1),
-        "north": numbers(north, 1),
-        "up": numbers(up, 1),
-        "above": numbers(height_above_ground, 1),
-        "airspeed": numbers(track.airspeed[rows], 2),
-        "climb": numbers(climb, 2),
-        "bank": numbers(roll, 1),
-        "pitch": numbers(pitch, 1),
-        "heading": numbers(yaw % 360.0, 1),
+        "time": json_numbers(track.time[rows], 2),
+        "east": json_numbers(east, 1),
+        "north": json_numbers(north, 1),
+        "up": json_numbers(up, 1),
+        "above": json_numbers(height_above_ground, 1),
+        "airspeed": json_numbers(track.airspeed[rows], 2),
+        "climb": json_numbers(climb, 2),
+        "bank": json_numbers(roll, 1),
+        "pitch": json_numbers(pitch, 1),
+        "heading": json_numbers(yaw % 360.0, 1),
         "leg": track.leg[rows].tolist(),
         "legs": leg_names(setup),
     }

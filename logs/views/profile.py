@@ -10,12 +10,12 @@ from logs.verdict.verdict import Verdict
 from logs.views.charts import NUMBERED_ITEM, NUMBERED_WAYPOINT, Chart, Label, Layer, Panel, find_outline_rows, shorten
 from logs.views.failures import (
     Failures,
-    failures,
+    collect_failures,
     find_rows_inside_threats,
     make_fail_labels,
     route_distance,
     route_samples,
-    stop_rows,
+    stop_start_indices,
     track_distance,
 )
 from logs.views.threats_and_zones import PathPlane, entered_cuts, threat_cuts, zone_bands
@@ -83,9 +83,9 @@ def profile_chart(
         )
     altitude_span = _choose_altitude_limits(scenario, route, track, ground)
     plane = PathPlane(distance / 1000.0, points, ground, *altitude_span)
-    failed = failures(verdict, len(route))
+    failed = collect_failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
-    stop_starts = stop_rows(stops)
+    stop_starts = stop_start_indices(stops)
     zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown_layers, entered_positions = _make_flown_layers(scenario, route, track, failed, plane)
@@ -126,7 +126,7 @@ def _make_chart(
     """Make the chart of the profile from its panel, with a mark at the start of each leg.
 
     waypoint_distances: distance of each waypoint along the route, m, (w,).
-    stop_starts: index of the first waypoint of each stop, as returned by `stop_rows`.
+    stop_starts: index of the first waypoint of each stop, as returned by `stop_start_indices`.
     is_straight: True if there is no route, only the straight line from start to destination.
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
@@ -280,7 +280,7 @@ def _make_waypoint_labels(
     stops: number of the stop to which each waypoint belongs, (w,).
     numbers: number to show for each waypoint, (w,); `NO_ITEM` for none.
     """
-    stop_starts = stop_rows(stops)
+    stop_starts = stop_start_indices(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0 or n == len(stop_starts) - 1} | set(
         failed.waypoints

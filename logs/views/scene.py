@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.views.failures import Failures, stop_rows
+from logs.views.failures import Failures, stop_start_indices
 from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
@@ -169,6 +169,6 @@ def scene_data(view: SceneView) -> dict[str, object]:
         ],
         **({"zones": zones} if zones else {}),
         "plan": np.round(setup.display_waypoints, 1).tolist(),
-        "numbers": [[k, stops[k]] for k in stop_rows(stops)],
+        "numbers": [[k, stops[k]] for k in stop_start_indices(stops)],
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }

@@ -36,7 +36,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
 from logs.views import figures
 from logs.views.charts import Chart
-from logs.views.failures import failures
+from logs.views.failures import collect_failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, make_subject, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
@@ -291,7 +291,7 @@ def _render_page(
     end_reason, versions, command, events: as in `write_report`, where `end_reason` is `ended`.
     """
     track, verdict = subject.track, subject.verdict
-    failed = failures(verdict, len(setup.route.points))
+    failed = collect_failures(verdict, len(setup.route.points))
     charts, flight = page_charts(views), report_flight(setup, track)
     shown_pictures = report_pictures(subject, charts, pictures)
     scene = charts.pop("scene")
