@@ -47,19 +47,14 @@ def profile_chart(
 ) -> Chart:
     """Chart altitudes (m AMSL) over the distance along the route (km).
 
-    Ground, threats and zones are cut by the vertical plane along the route.  Flown altitudes are drawn at the flight's
-    progress along the route, which never decreases.
+    Ground, threats and zones are cut by the vertical plane along the route.  Without a route, this is the plan, or else
+    the straight line from start to destination.  Flown altitudes are drawn at the flight's progress along the route.
 
-    plan_waypoints: waypoints of the plan, m, (p, 3), used if there is no route.  If there is neither, the chart shows
-        the straight line from start to destination.
-    route_waypoints: waypoints of the mission's route, m, (w, 3); None without a route.
-    track: flown track; None for a plan that was not flown.
-    verdict: verdict whose failures are marked; None to mark none.
-    stops: number of the stop to which each waypoint belongs, (w,), shown at the first waypoint of the stop; None if
-        each waypoint is a stop.
-    items: number of the mission item of each waypoint, shown in place of its stop; see `logs.views.map.flight_map`.
-    above_ground: height above ground at the end of each leg, m, (w,), NaN for legs that do not follow the terrain, as
-        in `flight.mission.route.Route`; None if no leg follows it.
+    plan_waypoints, route_waypoints: waypoints of the plan and of the mission's route, m, (p, 3) and (w, 3), or None.
+    track, verdict, items: as in `logs.views.map.flight_map`.
+    stops: number of the stop of each waypoint, shown at the stop's first waypoint; None if each waypoint is a stop.
+    above_ground: height above ground at the end of each leg, m, (w,), NaN for legs that do not follow the terrain; None
+        if no leg follows it.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup

@@ -218,10 +218,7 @@ _VALIDITY_FIELDS = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global
 
 
 def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
-    """Make all ULog topics of a flight, in PX4's axes and units.
-
-    rows: indices of the track's rows to include.
-    """
+    """Make all ULog topics of a flight from the given rows of its track, in PX4's axes and units."""
     track, origin = log.track, log.setup.scenario.origin
     stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
     (east, north, up), (v_east, v_north, v_up) = track.position[rows].T, track.velocity[rows].T
