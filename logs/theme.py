@@ -1,8 +1,8 @@
-"""Define the colours, line widths and dashes of all pictures, pages and scenes; no other file states any.
+"""Define the colours, line widths and dashes of all pictures, pages and scenes.
 
-A role ("missile", "planned") has one style, in a light and a dark variant.  PNG and SVG files use the light variant.
-Pages switch between both by the reader's preference.  Scenes of Foxglove and Rerun are black and use the dark variant.
-Charts name roles, never colours.
+No other file states any.  A role is a word for what is drawn ("missile", "planned"); charts name roles, never colours.
+Each role has one style in a light and a dark variant.  PNG and SVG files use the light variant; pages switch between
+both by the reader's preference; scenes of Foxglove and Rerun are black and use the dark variant.
 
 The colours of the data come from Okabe and Ito, "Color Universal Design" (2008), so that people with any of the common
 colour vision deficiencies can tell them apart.  Limits have ColorBrewer's violet.  Dashes, markers or hatches repeat
@@ -26,15 +26,15 @@ _BROWN = "#7a1f1f"
 
 @dataclass(frozen=True, slots=True)
 class RoleStyle:
-    """Style in which a role is drawn.
+    """The style in which a role is drawn.
 
-    light, dark: colour on light and on dark ground, "#rrggbb".
-    width: width of its lines, points; on a page a point is 1.25 pixels.
-    dash: lengths of strokes and gaps in the same unit, () for a solid line.
-    fill: opacity of its areas.
-    size: size of its dots; 0 without dots.
-    face: role of the colour inside its dots; "" for the same colour.
-    edge: role of the colour around its areas; "" for the same colour.
+    light, dark: colour on light and on dark background, "#rrggbb".
+    width: width of its lines, typographic points; on a page a point is 1.25 pixels.
+    dash: lengths of strokes and gaps, points; () for a solid line.
+    fill: opacity of its areas, 0 to 1.
+    size: size of its dots, points.
+    face: role whose colour fills its dots; "" for its own colour.
+    edge: role whose colour its areas have at their edge; "" for its own colour.
     marker: shape of its dots: "circle", "triangle", "star" or "cross".
     hatch: hatch of its areas in print, in matplotlib's notation.
     halo: True if its lines have a pale rim in print, because they cross coloured ground.
@@ -62,14 +62,14 @@ _ZONE = RoleStyle(_BROWN, "#e89090", fill=0.14, hatch="////")
 _SECOND = RoleStyle(_BLUE, "#7cc0f5", width=1.8)
 _GREY = "#6b6b6b"
 _PALE_GREY = "#a9adb5"
-# Looks of the path by the outcome of a return, and by the destination in reach without an engine.
+# Styles of the path by the outcome of a return to launch, and by the destination within reach without an engine.
 _SAFE = RoleStyle(_GREEN, "#2fc79a", width=4.4, halo=True)
 _WRONG = RoleStyle(_PURPLE, "#e87cc4", width=4.4, dash=(5.0, 1.0), halo=True)
 _SHORT = RoleStyle(_ORANGE, "#ffb938", width=4.4, dash=(9.0, 2.0), halo=True)
 _SPARE = 1.8  # width of a line of altitude to spare
 _NOT_KNOWN = RoleStyle(_GREY, _PALE_GREY, width=4.4, dash=(2.0, 3.0), halo=True)
 
-# Looks of the data, by role.
+# Style of each role of the data.
 ROLE_STYLES = {
     "missile": _MISSILE,
     "missile-reach": RoleStyle(_MISSILE.light, _MISSILE.dark, width=0.0, fill=0.3),
@@ -151,7 +151,7 @@ ROLE_STYLES = {
     "comes-down": RoleStyle("#333333", "#e8e8ea", width=1.0, size=3.4, face="paper"),
 }
 
-# Colours of axes and page, by use: light and dark.
+# Colours of axes and page, light and dark, by the element that has them.
 PAGE = {
     "paper": ("#ffffff", "#16181c"),
     "plot": ("#ffffff", "#1d2026"),
@@ -175,7 +175,7 @@ PAGE = {
     "on-badge": ("#ffffff", "#16181c"),
 }
 
-# Size of a label by its rank, points, and gap between the label and its position, pixels.
+# Size of a label, points, and gap between the label and its position, pixels, by the label's rank.
 LABELS = {"fail": (7.0, 16.0), "end": (8.0, 12.0), "number": (7.5, 8.0), "name": (6.2, 4.0)}
 
 # Colours of the ground from valley to summit.  The lightness increases, so that heights are readable without colour.
@@ -193,9 +193,12 @@ AIRCRAFT_PARTS = ("#ebebe0", "#d91a1a", "#1a9933")
 
 
 def colour(name: str, *, dark: bool = False) -> str:
-    """Return a colour of the theme, "#rrggbb".  Raises KeyError for an unknown name.
+    """Return a colour of the theme, "#rrggbb".
 
-    name: role of the data, or element of the page around the data.
+    Raises KeyError for an unknown name.
+
+    name: role of the data in `ROLE_STYLES`, or element of axes and page in `PAGE`.
+    dark: True for the colour on dark background.
 
     >>> colour("flown"), colour("paper", dark=True)
     ('#000000', '#16181c')
@@ -216,9 +219,10 @@ def rgb(text: str) -> tuple[float, float, float]:
 
 
 def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float, float, float, float]:
-    """Return the RGBA components (0 to 1) of a theme colour.
+    """Return red, green, blue and opacity of a theme colour, 0 to 1.
 
-    name: role of the colour, such as "flown".
+    name: role or page element, as in `colour`.
+    dark: True for the colour on dark background.
 
     >>> rgba("flown", 0.5)
     (0.0, 0.0, 0.0, 0.5)
@@ -227,7 +231,9 @@ def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float,
 
 
 def palette_colours() -> tuple[str, ...]:
-    """Return the colours that a picture with a reduced palette keeps: all roles, paper, ink and highlight.
+    """Return the light colours that a picture with a reduced palette keeps.
+
+    They are the colours of all roles, and paper, ink and highlight.
 
     >>> colour("missile") in palette_colours()
     True
@@ -245,9 +251,9 @@ def palette_colours() -> tuple[str, ...]:
 
 
 def css_variables() -> str:
-    """Return the theme's colours as the text of CSS rules with variables such as ``--missile``.
+    """Return CSS rules that define a variable such as ``--missile`` for each colour of the theme.
 
-    Screens that prefer a dark scheme get the dark colours instead of the light ones.
+    The variables have the light colours, and the dark colours on screens that prefer a dark scheme.
 
     >>> "--missile: #" in css_variables()
     True
@@ -266,10 +272,9 @@ _HEX = re.compile(r"#[0-9a-f]{6}\b")
 
 
 def replace_colours_by_css_variables(svg: str) -> str:
-    """Replace the light colours in an SVG's text by the variables of `css_variables`.
+    """Replace the theme's light colours in the text of an SVG by the variables of `css_variables`.
 
-    If several roles share a light colour, the variable of the first role is used.  Roles of the page come before roles
-    of the data.
+    If several names share a light colour, the first is used; names in `PAGE` come before names in `ROLE_STYLES`.
 
     >>> replace_colours_by_css_variables("fill: #1d1d1f; stroke: #123456")
     'fill: var(--ink); stroke: #123456'
@@ -278,7 +283,7 @@ def replace_colours_by_css_variables(svg: str) -> str:
     variable_by_colour |= {colour(name): name for name in reversed((*PAGE, *ROLE_STYLES))}
 
     def replace_colour(match: re.Match[str]) -> str:
-        """Return the variable of a matched colour; a colour without a variable is kept."""
+        """Return the variable of a matched colour, or the colour itself if it has no variable."""
         variable = variable_by_colour.get(match[0])
         return match[0] if variable is None else f"var(--{variable})"
 
@@ -292,9 +297,9 @@ _SYMBOLS = {"circle": "circle", "triangle": "triangle-up", "star": "star", "cros
 
 
 def page_styles() -> dict[str, dict[str, object]]:
-    """Return width, dash, opacity and size of each role for the page's scripts.
+    """Return the style of each role for the page's scripts.
 
-    The colours are in `css_variables`.
+    Colours are not included; `css_variables` defines them.  Widths, dashes and sizes are in pixels.
 
     >>> page_styles()["missile"]["dash"]
     'solid'

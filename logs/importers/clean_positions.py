@@ -1,6 +1,7 @@
-"""Put a log's positions in order: remove and count duplicate, late and impossible rows, and add no rows.
+"""Clean the positions of a log: remove clock jumps, sort the rows, and remove and count faulty rows.
 
-First the clock is made steady, then rows are sorted, then positions that no aircraft can have reached are removed.
+No rows are added.  First backward jumps of the clock are removed, then rows are sorted, then positions that no aircraft
+can have reached are removed.
 """
 
 import math
@@ -16,7 +17,7 @@ from world.arrays import Flags, Floats
 # ----------------------------------------------------------------------
 # The clock: permanent jumps back are removed, and late rows are sorted.
 
-# Largest lag of a row out of order behind the latest time, s; a clock that stays behind by more has jumped.
+# Largest lag behind the latest time that a row out of order can have, s; a clock that stays farther behind has jumped.
 MAX_CLOCK_LAG_S = 1.0
 # Number of successive late rows that show that the clock jumped.
 MIN_LATE_ROWS = 8
@@ -26,8 +27,8 @@ MIN_LATE_ROWS = 8
 class SteadyClock:
     """Times of a log's rows after the backward jumps of its clock were removed.
 
-    time: times of the rows, s, (n,); all rows after a jump are shifted.
-    jumps: time of the last row before each jump, s, on this clock.
+    time: times of the rows, s, (n,); the times after each jump are shifted.
+    jumps: time of the last row before each jump, s, on the clock without jumps.
     """
 
     time: Floats
@@ -37,13 +38,13 @@ class SteadyClock:
 def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
     """Remove the backward jumps of a log's clock from the times of its rows.
 
-    A row is late if its time is more than `MAX_CLOCK_LAG_S` before the latest time so far.  A clock that goes back and
-    stays back, so that `MIN_LATE_ROWS` rows in sequence, or all rows to the end, are late, has been reset.  The first
-    row after the reset is then moved to ``usual_step`` s after the latest row before it, and all later rows are shifted
-    by the same time.  A single row out of order, also at the end, keeps its time.
+    A row is late if its time is more than `MAX_CLOCK_LAG_S` before the latest time so far.  If `MIN_LATE_ROWS` rows in
+    sequence, or all rows to the end, are late, the clock has been reset.  The first row after the reset is then moved
+    to `usual_step` after the latest row before it, and all later rows are shifted by the same time.  A single row out
+    of order, also at the end, keeps its time.
 
     time: times of the rows in the order of the file, s, (n,).
-    usual_step: time that is assumed to have passed between the last row before a jump and the first row after it, s.
+    usual_step: assumed time between the last row before a jump and the first row after it, s.
 
     >>> remove_clock_jumps(np.array([10.0, 11.0, *range(2, 14)]), usual_step=1.0).time.tolist()
     [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0]
@@ -74,8 +75,8 @@ def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
 MAX_STEP_S = 1.0
 # Longest pause that is not a gap, in median steps between rows; the longer of both limits applies.
 MAX_STEP_RATIO = 1.5
-# Speed that is added to `GLITCH_SPEED_RATIO` times the usual speed, m/s: a position that is reached and left at a
-# higher speed is a glitch.  GPS receivers jump by kilometers, and no aircraft gains this speed between two rows.
+# A position that is reached and left at a higher speed than `GLITCH_SPEED_RATIO` times the usual speed plus this speed
+# (m/s) is a glitch.  GPS receivers jump by kilometers, and no aircraft gains this speed between two rows.
 GLITCH_SPEED_MPS = 60.0
 # Factor of the usual speed in the test for glitches.
 GLITCH_SPEED_RATIO = 3.0
@@ -97,15 +98,15 @@ _MAX_ALTITUDE_M = 50_000.0
 
 @dataclass(frozen=True, slots=True)
 class CleanPositions:
-    """Positions of the vehicle, in order of time.
+    """The positions of a vehicle, cleaned and in order of time.
 
     time: increasing times, s, (n,).
-    lat, lon: latitude and longitude, deg, (n,).
+    lat, lon: latitude and longitude, degrees, (n,).
     up: altitude, m, (n,); NaN if not in the log.
-    faults: numbers of corrected faults.
-    gaps: pauses between rows.
-    shifts: (start, shift) of each removed forward jump of the clock: all times from `start` on, s on the log's clock,
-        are moved `shift` s back.
+    faults: number of corrected faults of each kind.
+    gaps: long pauses between rows, see `find_gaps`.
+    shifts: (start, shift), s, of each removed forward jump of the clock: all times from `start` on, on the log's clock,
+        are moved back by `shift`.
     """
 
     time: Floats
@@ -117,7 +118,7 @@ class CleanPositions:
     shifts: tuple[tuple[float, float], ...] = ()
 
     def to_steady_clock(self, time: Floats) -> Floats:
-        """Convert times of the log's clock to the clock without jumps, s."""
+        """Convert times on the log's clock to the clock without forward jumps, s, (n,)."""
         shifted = np.array(time, dtype=np.float64)
         for start, shift in self.shifts:
             shifted[np.asarray(time) >= start] -= shift
@@ -127,11 +128,13 @@ class CleanPositions:
 def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> CleanPositions:
     """Sort the rows of a log's positions, remove faulty rows, and count the faults.
 
-    Faulty are rows without a valid time or position, rows with the time of an earlier row, glitches, and small groups
-    of rows whose times are far from all others.  Forward jumps of the clock are removed without removing rows.
+    Faulty rows are: rows without a valid time, position or altitude; rows with the time of an earlier row; glitches;
+    small groups of rows whose times are far from all others.  Forward jumps of the clock are removed, but not the rows
+    after them.
 
-    series: latitude and longitude (deg) and altitude (m), (n, 3).
-    earlier_jumps: times of the clock jumps that the reader of the log has removed, s; they are listed with the faults.
+    series: latitude and longitude (degrees) and altitude (m), (n, 3).
+    earlier_jumps: times of the clock jumps that the reader of the log has already removed, s; they are added to the
+        faults.
 
     >>> rows = np.array([[46.0, 8.0, 500.0], [46.0002, 8.0, 500.0], [46.0002, 8.0, 500.0], [47.0, 8.0, 500.0]])
     >>> more = np.array([[46.0004 + 0.0002 * k, 8.0, 500.0] for k in range(4)])
@@ -180,7 +183,7 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
     """Return the gaps between rows.
 
-    A gap is a pause longer than both `MAX_STEP_S` and `MAX_STEP_RATIO` median steps.  Fewer than two rows have no gap.
+    A gap is a pause longer than both `MAX_STEP_S` and `MAX_STEP_RATIO` median steps.
 
     time: increasing times of the rows, s, (n,).
     """
@@ -193,20 +196,24 @@ def find_gaps(time: Floats) -> tuple[Gap, ...]:
 
 
 def measure_steps(lat: Floats, lon: Floats) -> Floats:
-    """Return the distances between n successive positions, m, (n - 1,), also across the 180th meridian."""
+    """Return the distances between successive positions, m, (n - 1,), also across the antimeridian.
+
+    lat, lon: latitude and longitude of each position, degrees, (n,).
+    """
     north = np.diff(lat) * DEGREE_LENGTH_M
     east = (np.diff(lon) + 180.0) % 360.0 - 180.0
     return np.hypot(north, east * DEGREE_LENGTH_M * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
 
 
 def _find_glitches(time: Floats, values: Floats) -> Flags:
-    """Return a mask (n,): True for glitches, which are rows far from the path of the vehicle.
+    """Find glitches: rows far from the path of the vehicle.  Return a mask (n,), True for their rows.
 
-    A glitch begins with a leap that no vehicle can fly and ends with another leap, after which the vehicle is at a
-    position that it could reach from the last row before.  It has up to `MAX_GLITCH_ROWS` rows.  The first or last row
-    is also a glitch if a leap separates it from the others.  Fewer than five rows have no glitch.
+    A glitch begins with a leap that no vehicle can fly and ends with a second leap, after which the vehicle is at a
+    position that it could have reached from the last row before the glitch.  It has at most `MAX_GLITCH_ROWS` rows.
+    The first or the last row is also a glitch if a leap separates it from the others.  Fewer than five rows have none.
 
-    values: latitude and longitude (deg) and altitude (m), (n, 3).
+    time: increasing times, s, (n,).
+    values: latitude and longitude (degrees) and altitude (m), (n, 3).
     """
     is_glitch = np.zeros(time.size, bool)
     if time.size < 5:
@@ -244,10 +251,13 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
 
 
 def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove forward clock jumps: long time steps over which a moving vehicle hardly changed its position.
+    """Remove forward jumps of the clock.
 
-    values: latitude and longitude (deg) and altitude (m), (n, 3).
-    Returns the shifted times, s, and the shifts as in `CleanPositions.shifts`.  Fewer than 20 rows stay unchanged.
+    They are long time steps in which a moving vehicle hardly changed its position.  Return the shifted times, s, (n,),
+    and the shifts as in `CleanPositions.shifts`.  The times of fewer than 20 rows are not changed.
+
+    time: increasing times, s, (n,).
+    values: latitude and longitude (degrees) and altitude (m), (n, 3).
     """
     shifts: list[tuple[float, float]] = []
     if time.size < 20:

@@ -1,9 +1,11 @@
 """Find the messages of an ArduPilot dataflash log, and read their fields as columns.
 
-A message consists of the bytes 0xA3 and 0x95, the message type, and a body, whose length and fields the log itself
-states in FMT messages (ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message is valid if
-the next message, or the end of the file, follows immediately.  pymavlink's `DFReader` reports no damage, stopped at
-message 471 of 4,737 in a log with 400 wrong bytes, and takes 6 to 14 times as long.
+A message consists of the bytes 0xA3 and 0x95, the message type, and a body.  The log itself states the length and the
+fields of each type in FMT messages (ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message
+is valid if the next message, or the end of the file, follows immediately.
+
+This reader is used instead of pymavlink's `DFReader`, which reports no damage, stopped at message 471 of 4,737 in a log
+with 400 wrong bytes, and takes 6 to 14 times as long.
 """
 
 import mmap
@@ -21,14 +23,14 @@ from world.arrays import Bytes, Floats, Ints
 from world.kernels import compiled, copy_into, read_only
 
 # ----------------------------------------------------------------------
-# Bytes of a log that is mapped into memory and released piece by piece.
+# Bytes of a log that is mapped into memory, and released piece by piece.
 
 # Size of a piece, bytes.
 PIECE_BYTES = 16 * 2**20
 
 
 class MappedFile:
-    """Bytes of a file as a memory-mapped array.
+    """The bytes of a file as a memory-mapped array.
 
     data: bytes of the file, (n,).
 
@@ -41,7 +43,7 @@ class MappedFile:
     """
 
     def __init__(self, path: Path) -> None:
-        """Map a file into memory, to be read only."""
+        """Map a file into memory, read-only."""
         with path.open("rb") as file:
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self.data: Bytes = np.frombuffer(self._map, np.uint8)
@@ -56,9 +58,9 @@ class MappedFile:
 def iterate_piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
     """Yield the byte number at which each piece of a file ends, to read a large file piece by piece.
 
-    After each piece was used, `release_memory` is called.
+    `release_memory` is called after each piece, when the next end is requested.
 
-    size: size of the file, bytes; all pieces but the last have `PIECE_BYTES`.
+    size: size of the file, bytes; all pieces except the last have `PIECE_BYTES`.
 
     >>> list(iterate_piece_ends(3, lambda: None))
     [3]
@@ -81,7 +83,7 @@ HEADER_BYTES = 3
 FMT_TYPE = 128
 # Length of an FMT message, bytes.
 _FMT_BYTES = 89
-# Largest number of bytes at the end of a log that are not damage: block storage leaves old bytes in its last page.
+# Largest number of bytes after the last message that are not damage: block storage leaves old bytes in its last page.
 MAX_TRAILING_BYTES = 528
 # Format letters: numpy type, and the factor by which a value is multiplied before it is stored (ArduPilot,
 # libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
@@ -111,7 +113,7 @@ FIELDS: dict[str, tuple[str, int]] = {
 
 
 class MessageFormat(NamedTuple):
-    """Format of the messages of one type, as stated by an FMT message.
+    """The format of the messages of one type, as an FMT message states it.
 
     number: number of the message type.
     name: name of the messages.
@@ -133,7 +135,7 @@ class MessageFormat(NamedTuple):
 
     @property
     def scales(self) -> dict[str, int]:
-        """Factors by which values are multiplied before they are stored, by field.
+        """Factor by which the values of a field are multiplied before they are stored, keyed by field name.
 
         Fields that are stored unchanged are absent.
         """
@@ -152,7 +154,7 @@ class Messages:
 
     starts: byte at which each message begins, (n,).
     rows: structured array with the fields of each message as stored, (n,).
-    scales: factors by which the values of some fields were multiplied before they were stored, by field.
+    scales: factor by which the values of a field were multiplied before they were stored; absent for a factor of 1.
     """
 
     starts: Ints
@@ -164,11 +166,11 @@ class Messages:
         return len(self.starts)
 
     def has(self, *names: str) -> bool:
-        """Return True if there are messages with all these fields."""
+        """Return True if there is at least one message, and messages have all these fields."""
         return len(self.starts) > 0 and set(names) <= set(self.rows.dtype.names or ())
 
     def column(self, name: str) -> Floats:
-        """Return the values of a numeric field, divided by the field's factor, (n,)."""
+        """Return the values of a numeric field, with the factor of their storage removed, (n,)."""
         values = self.rows[name].astype(np.float64)
         # Division, unlike multiplication by 0.01, gives the float nearest to the decimal number.
         return np.asarray(values / self.scales.get(name, 1))
@@ -184,14 +186,14 @@ class Messages:
 
 @dataclass(frozen=True, slots=True)
 class Dataflash:
-    """Index of a dataflash log.
+    """The index of a dataflash log: where its messages begin.
 
     data: bytes of the log.
-    starts: byte numbers at which the indexed messages begin, by number of the message type.
-    formats: formats by number of the message type.
-    names: names of all messages that the log contains, indexed or not.
+    starts: byte numbers at which the indexed messages begin, keyed by the number of the message type.
+    formats: format of each message type, keyed by its number.
+    names: names of all messages that the log contains, also of those that are not indexed.
     damage: parts that could not be read.
-    release_memory: function that releases the memory of the mapped log; called regularly during reading.
+    release_memory: function that releases the memory of the mapped log; called regularly while the log is read.
     """
 
     data: Bytes
@@ -202,7 +204,10 @@ class Dataflash:
     release_memory: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
-        """Return all messages with a name, except a cut message at the end; length 0 if the log has none."""
+        """Return all indexed messages with a name, except a cut message at the end.
+
+        The result has length 0 if there are none.
+        """
         numbers = [number for number, entry in self.formats.items() if entry.name == name and number in self.starts]
         if not numbers:
             return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
@@ -262,10 +267,11 @@ def index_dataflash(
 
 
 class _FoundMessages(NamedTuple):
-    """Requested messages of a log, and the damage of the log.
+    """The requested messages of a log, and the damage of the log.
 
-    starts, kinds: byte number of the start, and type, of each requested message, (n,).
-    counts: number of messages of each type, requested or not, (256,): entry k is for type k.
+    starts: byte number at which each requested message begins, (n,).
+    kinds: type of each requested message, (n,).
+    counts: number of messages of each type, also of types that were not requested, (256,).
     places, size: number of damaged places, and their total size in bytes.
     cut: True if the last message is cut.
     """
@@ -279,11 +285,12 @@ class _FoundMessages(NamedTuple):
 
 
 def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory: Callable[[], None]) -> _FoundMessages:
-    """Find the messages of the requested types piece by piece, and count damaged places and lost bytes.
+    """Find the messages of the requested types, and count damaged places and lost bytes.
 
-    Old bytes after the last message, up to `MAX_TRAILING_BYTES`, are not damage.
+    Up to `MAX_TRAILING_BYTES` old bytes after the last message are not damage.
 
-    is_requested: mask of the requested message types, (256,).
+    is_requested: True for each requested message type, (256,).
+    release_memory: function that is called after each piece of the log.
     """
     state = np.zeros(6, np.int64)
     lengths = np.zeros(256, np.int64)
@@ -322,7 +329,7 @@ def _parse_format(body: bytes) -> MessageFormat | None:
 
 
 # Indices of the state of a walk over messages.
-# Next byte.
+# Number of the next byte.
 _NEXT_BYTE = 0
 # Number of damaged places, where no message begins.
 _DAMAGED_PLACES = 1
@@ -336,8 +343,8 @@ _IS_READING = 4
 _IS_CUT = 5
 
 
-# The walk goes from message to message by their lengths.  In a damaged place, where no valid message begins, it goes on
-# byte by byte to the next valid message.
+# The walk goes from message to message by their lengths.  In a damaged place, where no valid message begins, it
+# continues byte by byte to the next valid message.
 @compiled
 def _walk_messages(
     data: Bytes,
@@ -350,13 +357,17 @@ def _walk_messages(
     max_trailing_bytes: int,
     is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Find the requested messages up to byte `stop`, and return their starts (byte numbers) and types.
+    """Find the requested messages that begin before byte `stop`.
+
+    Return their starts (byte numbers) and their types.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
-    lengths: length of the messages of each type, bytes, (256,); 0 if not yet known, updated by each FMT message.
-    counts: number of messages of each type, (256,), which is updated; entry k of both arrays is for type k.
-    header_bytes: length of a message's header, bytes.  fmt_type: message type of FMT messages.
-    max_trailing_bytes: bytes at the end that need not be a message.  is_requested: mask of the types to find, (256,).
+    lengths: length of the messages of each type, bytes, (256,); 0 if not yet known; updated at each FMT message.
+    counts: number of messages of each type, (256,); updated.
+    header_bytes: length of a message's header, bytes.
+    fmt_type: message type of FMT messages.
+    max_trailing_bytes: largest number of bytes at the end that need not be a message.
+    is_requested: True for each type to find, (256,).
     """
     starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     found_count, data_end = 0, data.size

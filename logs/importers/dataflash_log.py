@@ -1,7 +1,7 @@
-"""Read ArduPilot's dataflash logs (`.BIN`): positions, measurements and commands of the vehicle.
+"""Read ArduPilot's dataflash logs (`.BIN`) into a `RawLog`.
 
-`logs.importers.dataflash_frames` finds the messages; this module makes a `RawLog` from them.  Names of messages and
-fields follow ArduPilot's log documentation of the current release and of older releases.
+`logs.importers.dataflash_frames` finds the messages.  Names of messages and fields follow ArduPilot's log documentation
+of the current release and of older releases.
 """
 
 import math
@@ -41,11 +41,11 @@ _HOME = 1
 def make_dataflash_missions(
     commands: Messages, time: Floats, origins: Messages, source: str
 ) -> Iterator[LoggedMission]:
-    """Yield the missions of a log in their order.
+    """Yield the missions of a log in the order in which they were logged.
 
-    An item that is logged again when it is flown is not repeated.
+    An item that is logged again when it is flown is not repeated.  Nothing is yielded without usable CMD messages.
 
-    commands: CMD messages.
+    commands: CMD messages, each with one item.
     time: time of each CMD message, s, (n,).
     origins: ORGN messages, which contain home.
     source: name of the log.
@@ -92,7 +92,7 @@ def find_logged_home(origins: Messages) -> Home | None:
 
 
 FORMAT = "ArduPilot dataflash log"
-# Vehicle by VER.BT, the vehicle for which the program was built.
+# Kind of vehicle by VER.BT, the number of the vehicle for which the program was built.
 _BUILDS: dict[int, VehicleKind] = {
     1: "rover",
     2: "copter",
@@ -125,14 +125,20 @@ _WEEK_S = 604_800.0
 
 
 def read_dataflash(path: Path) -> RawLog:
-    """Read a dataflash log.  Raises LogError for a log without positions."""
+    """Read a dataflash log into a `RawLog`.
+
+    Raises LogError for a log without positions.
+    """
     file = MappedFile(path)
     index = index_dataflash(file.data, _READ, file.release_memory)
     return _Reader(index, str(path)).read()
 
 
 def find_firmware_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
-    """Return the firmware and the kind of vehicle, from the first MSG text that names a firmware, or else from VER.
+    """Return the name and version of the firmware, and the kind of vehicle.
+
+    They come from the first MSG text that names a firmware, or else from VER.  Without either they are "" and
+    "unknown".
 
     texts: texts of the MSG messages.
     version: VER messages.
@@ -152,13 +158,14 @@ def find_firmware_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[
 
 
 class _Reader:
-    """Reader of one log, with a method for each part of `RawLog`."""
+    """The reader of one log."""
 
     def __init__(self, index: Dataflash, source: str) -> None:
-        """Take the index of a log and its path, and find the backward jumps of the log's clock.
+        """Find the backward jumps of the log's clock from the messages POS, ATT, GPS and MODE.
 
-        The jumps are found from the n messages POS, ATT, GPS and MODE; other messages are corrected like their
-        neighbours in the file.
+        Other messages are later shifted like their neighbours in the file.
+
+        source: path of the log.
         """
         self._index, self._source = index, source
         self._cache: dict[str, Messages] = {}
@@ -172,14 +179,16 @@ class _Reader:
         raw_times = np.concatenate(times)[order]
         is_finite = np.isfinite(raw_times)
         steady = remove_clock_jumps(raw_times[is_finite])
-        # Byte at which each of these messages starts, (n,), shift that must be added to its time, s, (n,), and times of
-        # the jumps, s.
+        # Byte at which each of these messages starts, (n,); shift to add to its time, s, (n,); times of the jumps, s.
         self._clock_starts = np.concatenate(starts)[order][is_finite]
         self._clock_shifts = steady.time - raw_times[is_finite]
         self._clock_jumps = steady.jumps
 
     def read(self) -> RawLog:
-        """Return the log.  Raises LogError for a log without positions."""
+        """Read all data of the log.
+
+        Raises LogError for a log without positions.
+        """
         wind = self._read_first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
         throttles = (self._read_table("CTUN", (column,), 0.01) for column in ("ThO", "ThrOut"))
         tables = {
@@ -250,7 +259,10 @@ class _Reader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; only those of the first sensor or estimator that logs them."""
+        """Return the messages with a name.
+
+        If several sensors or estimators log them, only those of the first one are returned.
+        """
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
@@ -262,7 +274,7 @@ class _Reader:
         return self._cache[name]
 
     def _compute_times(self, messages: Messages) -> Floats:
-        """Return the times of messages on the clock without jumps back, s."""
+        """Return the times of messages on the log's clock without its backward jumps, s, (n,)."""
         raw_time = _read_raw_time(messages)
         if not self._clock_jumps:
             return raw_time
@@ -270,9 +282,9 @@ class _Reader:
         return np.asarray(raw_time + self._clock_shifts[np.clip(following, 0, len(self._clock_shifts) - 1)])
 
     def _read_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
-        """Return fields of the messages with a name, multiplied by `scale`.
+        """Read fields of the messages with a name as the columns of a series, multiplied by `scale`.
 
-        Returns None if the log lacks a field or the times.
+        Return None if the log lacks the messages, a field or the times.
         """
         columns = tuple(columns)
         messages = self._select_messages(name)
@@ -282,11 +294,11 @@ class _Reader:
         return LogSeries(name, self._compute_times(messages), values * scale)
 
     def _read_first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
-        """Read a quantity that several messages state from the first of them that the log contains.
+        """Read a quantity that several messages can state from the first of them that the log contains.
 
-        Returns None if the log contains none of them.
+        Return None if the log contains none of them.
 
-        choices: the messages in the order of preference, each with its name and the names of its fields.
+        choices: name and fields of each message, in the order of preference.
         scale: factor by which the values are multiplied.
         """
         for name, columns in choices:
@@ -296,9 +308,10 @@ class _Reader:
         return None
 
     def _read_position(self) -> LogSeries | None:
-        """Return the estimated positions, or else the positions of GPS with a 3-D fix.
+        """Read latitude, longitude (degrees) and altitude (m), estimated or else from GPS, (n, 3).
 
-        Return None if the log has neither.  If the log does not state the fix, all positions of GPS are returned.
+        Of the GPS positions, only those with a 3-D fix are returned if the log states the fix.  Return None if the log
+        has neither.
         """
         estimate = self._read_first_table((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
         if estimate is not None:
@@ -312,7 +325,7 @@ class _Reader:
         return LogSeries("GPS", position.time[has_fix], position.values[has_fix])
 
     def _read_velocity(self) -> LogSeries | None:
-        """Return the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS.
+        """Read the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS.
 
         Return None if the log has neither.
         """
@@ -328,10 +341,9 @@ class _Reader:
         return LogSeries("GPS", gps.time, np.stack([speed * np.sin(course), speed * np.cos(course), -down], axis=1))
 
     def _read_airspeed(self) -> LogSeries | None:
-        """Return the true airspeed, m/s, (n, 1); None if unknown.
+        """Read the true airspeed, m/s, (n, 1); None if it was not measured.
 
-        It is converted from the equivalent airspeed that ArduPilot logs: the airspeed of a sensor in use (ARSP), or
-        else the airspeed in CTUN.
+        It is converted from the equivalent airspeed that ArduPilot logs: of a sensor in use (ARSP), or else in CTUN.
         """
         sensor = self._select_messages("ARSP")
         airspeed = self._read_table("ARSP", ("Airspeed",))
@@ -344,7 +356,7 @@ class _Reader:
             )
         if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
             return None
-        # Ratio of true to equivalent airspeed: logged, or else of the standard atmosphere at the logged altitude, or 1.
+        # The ratio of true to equivalent airspeed is logged, or else taken from the standard atmosphere, or else 1.
         time = airspeed.time
         ratios = np.ones(len(time))
         logged_ratio, position = self._read_table("CTUN", ("E2T",)), self._read_position()
@@ -359,7 +371,7 @@ class _Reader:
         return LogSeries(airspeed.source, time, airspeed.values * ratios[:, None])
 
     def _read_battery(self) -> LogSeries | None:
-        """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured.
+        """Read the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured.
 
         If the log has no energy, it is integrated from voltage and current.
         """
@@ -381,7 +393,10 @@ class _Reader:
             yield from zip(self._compute_times(messages).tolist(), messages.texts("Message"), strict=True)
 
     def _find_utc_start(self) -> float:
-        """Return the UTC time at time 0 of the log's clock, s since 1970; NaN if the log has no GPS fix."""
+        """Return the UTC time at time 0 of the log's clock, s since 1970.
+
+        Return NaN if no GPS time with a fix is logged.
+        """
         messages = self._select_messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if messages.has(weeks, millis, "TimeUS"):
@@ -424,9 +439,9 @@ _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1
 
 
 def _read_raw_time(messages: Messages) -> Floats:
-    """Return the times of messages on the log's own clock, s.
+    """Return the times of messages as logged, s, (n,).
 
-    Before 2015 they were logged in milliseconds.
+    They are logged in microseconds, before 2015 in milliseconds.
     """
     if messages.has("TimeUS"):
         return messages.column("TimeUS") * 1e-6

@@ -1,7 +1,8 @@
 """Choose one flight of a log, and resample all its data at the times of its positions.
 
-A log may contain several flights, and each flight may follow several missions: `make_flight` chooses a flight along one
-mission.  From it follow the altitudes for a plan that states none, the mean wind, and the track that is judged.
+A log may contain several flights, and each flight may follow several missions: `make_flight` chooses one flight along
+one mission.  The other functions derive from it altitudes for a plan without altitudes, the mean wind, and the track
+that is judged.
 """
 
 import itertools
@@ -26,23 +27,23 @@ from world.wording import count_text
 
 # Median ground speed above which the aircraft flies, m/s.
 MIN_FLYING_SPEED_MPS = 6.0
-# Longest time for which an aircraft in flight may be slower because of a headwind, s.
+# Longest time for which an aircraft in flight may be slower than that, because of a headwind, s.
 MAX_SLOW_TIME_S = 60.0
 # Window of the median ground speed, s.
 _MEDIAN_WINDOW_S = 5.0
 # A flight that begins or ends within this time of the log's first or last row is cut off by the log, s.
 CUT_FLIGHT_TIME_S = _MEDIAN_WINDOW_S
-# Least duration of a flight, s.
+# Shortest duration of a flight, s.
 MIN_FLIGHT_TIME_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class FlightPart:
-    """Part of a log: one flight, and the one mission that it followed.
+    """One flight of a log, and one mission that it followed.
 
-    start, end: times of the flight, s.
-    mission: index of the mission in the log, -1 for none.
-    stretches: periods in which the flight followed the mission.
+    start, end: start and end of the flight, s.
+    mission: index of the mission in the log; -1 for none.
+    stretches: periods in which the flight followed this mission.
     """
 
     start: float
@@ -52,17 +53,19 @@ class FlightPart:
 
     @property
     def along_mission(self) -> float:
-        """Total time for which the flight followed the mission, s."""
+        """Total duration of the stretches, s."""
         return sum(stretch.end - stretch.start for stretch in self.stretches)
 
 
 def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
     """Return the start and end of each flight, s.
 
-    A flight is a period of at least `MIN_FLIGHT_TIME_S` with a ground speed above `MIN_FLYING_SPEED_MPS`, measured as a
-    running median.  It may contain slower periods of up to `MAX_SLOW_TIME_S`.  Fewer than three rows have no flight.
+    A flight is a period of at least `MIN_FLIGHT_TIME_S` in which the running median of the ground speed is above
+    `MIN_FLYING_SPEED_MPS`.  It may contain slower periods of up to `MAX_SLOW_TIME_S`.  Fewer than three rows have no
+    flight.
 
-    time, lat, lon: times (s) and positions (deg), (n,).
+    time: increasing times, s, (n,).
+    lat, lon: positions, degrees, (n,).
 
     >>> time = np.arange(0.0, 200.0)
     >>> north = np.cumsum(np.where((time > 50.0) & (time < 150.0), 20.0, 0.1))
@@ -96,14 +99,14 @@ def find_flight_parts(
     missions: Sequence[LoggedMission],
     log_end: float,
 ) -> list[FlightPart]:
-    """Split the flights of a log by the missions that they followed, one part for each flight and mission.
+    """Split the flights of a log by the missions that they followed: one part for each flight and mission.
 
-    A flight followed its mission while the vehicle's mode was one that follows the mission, such as AUTO.  A flight
-    that followed no mission is one part without stretches.
+    A flight followed its mission while the vehicle was in a mode that follows the mission, such as AUTO.  A flight that
+    followed no mission is one part without stretches.
 
-    spans: start and end of each flight, from `find_flight_spans`.
-    modes: mode changes in the log; without any, each whole flight is assumed to follow its mission.
-    missions: missions in the log.
+    spans: start and end of each flight, s, as returned by `find_flight_spans`.
+    modes: mode changes in the log; without any, each flight is assumed to follow its mission throughout.
+    missions: missions in the log, in the order of time.
     log_end: time of the last row of the log, s.
     """
     parts = []
@@ -136,8 +139,8 @@ def find_flight_parts(
 def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
     """Return the index of the mission that a stretch of a flight followed, or -1 if unknown.
 
-    It is the last mission logged up to a second after the start of the stretch, or else the first mission logged
-    later in the stretch.
+    It is the last mission that was logged no later than a second after the start of the stretch, or else the first
+    mission that was logged later in the stretch.
     """
     earlier_missions = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
     if earlier_missions:
@@ -147,7 +150,10 @@ def _find_mission(stretch: MissionStretch, missions: Sequence[LoggedMission]) ->
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the part that followed its mission longest; in a tie, of the longest part."""
+    """Return the index of the part that followed its mission for the longest time.
+
+    In a tie, the part of the longest flight is chosen.
+    """
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
@@ -155,9 +161,9 @@ def choose_part(parts: Sequence[FlightPart]) -> int:
 SHOWN_MARGIN_S = 10.0
 # Longest interval between rows over which values are interpolated, s.
 _MAX_INTERPOLATED_STEP_S = 1.0
-# Longest interval for interpolation as a multiple of the series' usual interval, if that is longer.
+# That interval as a multiple of the series' usual interval; the longer of both limits applies.
 _MAX_INTERPOLATED_STEPS = 2.5
-# Duration at the start of a flight over which altitudes are compared, s.
+# Duration at the start of a flight over which altitudes from several sources are compared, s.
 _COMPARED_TIME_S = 5.0
 # Vehicles whose logs are refused, with their names in the message.
 _REFUSED: dict[VehicleKind, str] = {
@@ -179,20 +185,20 @@ class LoggedFlight:
     """One flight of a log, with n rows at the times of its positions.
 
     raw: the log.
-    time: times on the log's clock, s, (n,).
-    lat, lon: latitude and longitude, deg, (n,).
+    time: times on the log's clock without forward jumps, s, (n,).
+    lat, lon: latitude and longitude, degrees, (n,).
     up: altitude, m, (n,).
-    columns: values of each quantity of `logs.importers.raw_log.COLUMNS`, (n, k), by its name: ``columns["velocity"]``
-        is (n, 3); NaN at times where the log has no value nearby.
+    columns: values of each quantity in `logs.importers.raw_log.COLUMNS` except "height", keyed by its name:
+        ``columns["velocity"]`` is (n, 3).  NaN at times where the log has no value nearby.
     holds: names of the quantities that the log contains.
-    stretches: periods in which the flight followed the mission.
+    stretches: periods in which the flight followed its mission.
     mission: mission of the flight; None if the log contains none.
     heights, gaps, faults: see `flight.simulation.setup.ImportedLog`.
-    number, count: number of this flight in the log, from 1, and number of flights.
-    others: start of each other flight, s, and the time for which it followed a mission, s.
-    begins_in_flight, ends_in_flight: True if the first or the last row of the log is in the air: the log lacks the rest
-        of the flight.
-    clock: cleaned positions of the whole log, which convert times of the log's clock to `time`.
+    number: number of this flight in the log, from 1.
+    count: number of flights in the log.
+    others: for each other flight, its start (s) and the time for which it followed a mission (s).
+    begins_in_flight, ends_in_flight: True if the log begins or ends in the air, and so lacks a part of the flight.
+    clock: cleaned positions of the whole log, which convert times on the log's clock to `time`.
     """
 
     raw: RawLog
@@ -218,10 +224,12 @@ class LoggedFlight:
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     """Extract one flight from a log.
 
-    number: number of the flight in the log, from 1; None for the flight that followed its mission for the longest time.
-        A flight that followed several missions counts as several flights.
+    A flight that followed several missions is treated as several flights.
 
-    Raises LogError for a vehicle other than an aeroplane, a log without a flight, and a number that is not in the log.
+    Raises LogError for a vehicle other than an aeroplane, a log that is too long, a log without a flight, and a number
+    that is not in the log.
+
+    number: number of the flight in the log, from 1; None for the flight that followed its mission for the longest time.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> flight = make_flight(example_raw_log())
@@ -276,8 +284,9 @@ def _extract_flight(
     count: int,
     others: tuple[tuple[float, float], ...],
 ) -> LoggedFlight:
-    """Return one part of a log as a flight, with all its data interpolated to the times of its positions.
+    """Return one part of a log as a flight, with all its data interpolated at the times of its positions.
 
+    positions: cleaned positions of the whole log.
     number, count, others: as in `LoggedFlight`.
     """
     is_kept = (positions.time >= part.start - SHOWN_MARGIN_S) & (positions.time <= part.end + SHOWN_MARGIN_S)
@@ -324,14 +333,15 @@ def _extract_flight(
 
 
 def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions: CleanPositions) -> Floats:
-    """Return a series interpolated at other times, (n, k); all NaN for a log without the series.
+    """Interpolate a series at n times, (n, k); all NaN for a series of fewer than two valid rows.
 
-    Values are NaN in long intervals without rows, and far before the first and after the last row.  Invalid rows of the
-    series are ignored.  Angles of the attitude are interpolated across their full turn.
+    Values are NaN in long intervals without rows, and long before the first and after the last row.  Invalid rows of
+    the series are ignored.  Angles of the attitude are interpolated across full turns.
 
+    series: the series; None if the log lacks it.
     name: name of the series in `COLUMNS`.
     time: times on the clock without jumps, s, (n,).
-    positions: cleaned positions, with the corrections of the log's clock.
+    positions: cleaned positions, which convert times of the series to the clock without jumps.
     """
     width = len(COLUMNS[name])
     interpolated = np.full((time.size, width), math.nan)
@@ -370,15 +380,15 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
 
 
 # ----------------------------------------------------------------------
-# Altitudes for a plan that states none: the altitudes at which the flight passed its items.
+# Altitudes for a plan without altitudes: those at which the flight passed its items.
 
 
 def with_flown_altitudes(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
-    """Set each item with a position to the altitude at which a flight passed closest to it.
+    """Set the altitude of each item with a position to the flight's altitude at its closest point.
 
-    If no altitude of the flight is known, the altitudes are set to 0.
+    If no altitude of the flight is known, the altitudes are set to 0.  Without rows, the items are not changed.
 
-    lat, lon, up: positions of the flight, deg and m, (n,); rows with an unknown altitude (NaN) are ignored.
+    lat, lon, up: positions of the flight, degrees and m, (n,); rows with an unknown altitude (NaN) are ignored.
 
     >>> from flight.mission.items import MissionItem
     >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
@@ -409,10 +419,10 @@ _MAX_WIND_MPS = 30.0
 
 @dataclass(frozen=True, slots=True)
 class MeanWind:
-    """Mean wind.
+    """The mean wind of a flight.
 
-    speed: m/s.
-    from_course: direction from which the wind blows, rad clockwise from north.
+    speed: wind speed, m/s.
+    from_course: direction from which the wind blows, rad, clockwise from north.
     source: name of the log message with the wind.
     """
 
@@ -422,11 +432,11 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """Return the mean wind while the flight followed its mission, or None if the log contains no wind.
+    """Return the mean of the logged wind while the flight followed its mission.
 
-    It is the mean over the whole flight if the flight never followed a mission.  The first fifth of the rows is left
-    out, because the autopilot's estimate starts at zero and converges only in the first turns.  The speed is limited to
-    the largest wind speed that a scenario allows.
+    Return None if the log contains no wind.  If the flight never followed its mission with a known wind, it is the mean
+    over the whole flight.  The first fifth of the rows is left out, because the autopilot's estimate starts at zero and
+    converges only in the first turns.  The speed is limited to the largest wind speed that a scenario allows.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight
@@ -450,11 +460,11 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 
 
 def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
-    """Convert a flight to a track with map coordinates relative to ``origin``.
+    """Convert a flight to a track with map coordinates relative to `origin`.
 
-    Velocities that the log lacks are computed from the positions.  For a log without altitudes the track has altitude
-    0, which no rule judges.  The energy is counted from its first known value.  Columns that no log contains are NaN,
-    and all rows are on leg 0.
+    Velocities that the log lacks are computed from the positions.  Unknown altitudes become 0; no rule judges them.
+    The energy is relative to its first known value.  Columns that no imported log contains are NaN, and all rows are on
+    leg 0.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

@@ -1,4 +1,4 @@
-"""Read content that is common to several log formats: missions, and the flight modes of ArduPlane and PX4."""
+"""Interpret mission items and numbers of flight modes, which several log formats contain."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -13,10 +13,10 @@ from logs.importers.raw_log import LoggedMission
 
 
 class LoggedItem(NamedTuple):
-    """Mission item as logged.
+    """A mission item as logged.
 
     time: time at which the item was logged, s.
-    total: number of items of the mission; 0 if not logged.
+    total: number of items that the mission has according to the log; 0 if not logged.
     begins_mission: True if the log shows that a new mission begins with this item.
     """
 
@@ -27,10 +27,10 @@ class LoggedItem(NamedTuple):
 
 
 class LoggedItemGroup(NamedTuple):
-    """Logged items of one mission.
+    """The logged items of one mission.
 
-    time: time from which they apply, s.
-    total: announced number of items; 0 if not logged.
+    time: time from which the mission applies, s.
+    total: number of items that the mission has according to the log; 0 if not logged.
     items: the items, by increasing number.
     """
 
@@ -42,9 +42,10 @@ class LoggedItemGroup(NamedTuple):
 def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     """Combine logged items, in the order of the log, into missions.
 
-    An item 0 begins a new mission if the item after it shows that this mission is logged from its beginning.  Another
-    item that equals the mission's item of this number was logged because it was flown.  An item that differs from it
-    was edited, and begins a changed mission.  If a mission is logged twice, each time incompletely, both are merged.
+    An item 0 begins a new mission if the item after it shows that the items are logged from the start again.  Any other
+    item is compared with the item of the same number in the current mission.  If both are equal, it was logged because
+    it was flown.  If they differ, it was edited, and a changed mission begins.  Successive incomplete logs of the same
+    mission are merged.
 
     >>> waypoints = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [*(LoggedItem(1.0, 3, item) for item in waypoints), LoggedItem(9.0, 3, waypoints[1])]
@@ -90,28 +91,25 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
 
 
 def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
-    """Return True if two items have the same number, command, parameters and position.
-
-    Their frames may differ.
-    """
+    """Return True if two items have the same number, command, parameters and position; frames are ignored."""
     return _make_comparison_key(first) == _make_comparison_key(second)
 
 
 def _make_comparison_key(item: MissionItem) -> tuple[object, ...]:
-    """Return the values by which items are compared.
+    """Return the values of an item that must be equal in equal items.
 
-    Numbers become texts, so that unset numbers (NaN) are equal.
+    Numbers are texts, so that NaN equals NaN.
     """
     return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 
 def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission from its logged items, with item 0 as home.
+    """Make a mission from its logged items, with a waypoint of number 0 as home.
 
-    An invalid item is left out with a warning.  If items are missing, the mission is the longest run without a gap.
-    Return None for a complete mission with fewer than two items besides home.
+    An invalid item is left out with a warning.  If items are missing, the mission is the longest run of consecutive
+    items, see `without_gaps`.  Return None for a complete mission with fewer than two items in addition to home.
 
-    source: name of the log.
+    source: path of the log.
     origin: name of the log messages with the items.
 
     >>> waypoints = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
@@ -145,7 +143,7 @@ def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> Lo
 
 
 def renumber_px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
-    """Renumber items of PX4, which counts from 0, so that they count from 1.
+    """Renumber PX4's mission items, which start with number 0, so that they start with 1.
 
     A vertical take-off becomes a take-off, because PX4 flies to the position of both in the same way (docs.px4.io,
     "Mission Mode (VTOL)").
@@ -161,11 +159,11 @@ def renumber_px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
 def without_gaps(logged: LoggedMission, total: int, last_number: int) -> LoggedMission | None:
     """Reduce an incomplete mission to its longest run of items with consecutive numbers.
 
-    The run ends before its first DO_JUMP to an item outside the run, so that an incomplete mission may have no items
-    left.  A complete mission is returned unchanged, or as None if it has fewer than two items.
+    The run ends before its first DO_JUMP to an item outside the run, so an incomplete mission may have no items left.
+    Return a complete mission unchanged, or None if it has fewer than two items.
 
-    total: announced number of items, 0 if unknown.
-    last_number: largest known number of an item; items are numbered from 1.
+    total: number of items that the mission has according to the log; 0 if not logged.
+    last_number: highest item number that the mission has or should have; items are numbered from 1.
     """
     numbers = {item.seq for item in logged.mission.items}
     missing = tuple(sorted(set(range(1, last_number + 1)) - numbers))

@@ -1,7 +1,6 @@
-"""Define the motion of an aircraft in a log at full rate: inertial sensors, servos, attitude, air data, battery.
+"""Define the data of a log from which an aircraft model is identified: motion at full rate.
 
-`logs.importers.raw_log` defines the data for a verdict; this module defines the data for the identification of an
-aircraft's model.  `logs.importers.motion_log` reads them from logs.
+The data for a verdict are defined in `logs.importers.raw_log`.  `logs.importers.motion_log` reads the motion from logs.
 """
 
 import math
@@ -14,7 +13,7 @@ import numpy as np
 from logs.importers.raw_log import VehicleKind
 from world.arrays import Floats
 
-# Number of servo outputs of `MotionLog.outputs`.
+# Number of servo outputs in `MotionLog.outputs`.
 OUTPUTS = 14
 # Ground speed below which a vehicle stands on the ground, m/s.
 _STANDING_SPEED_MPS = 2.0
@@ -25,7 +24,7 @@ class Samples:
     """Rows of one quantity, or of several quantities that are measured together.
 
     time: increasing times on the log's clock, s, (n,).
-    values: columns of the rows, (n, k).
+    values: one column for each quantity, (n, k).
     """
 
     time: Floats
@@ -33,19 +32,19 @@ class Samples:
 
     @property
     def rate(self) -> float:
-        """Median rate of rows, Hz; 0 for fewer than two rows."""
+        """Usual number of rows per second, from the median interval; 0 for fewer than two rows."""
         return float(1.0 / max(1e-6, np.median(np.diff(self.time)))) if len(self.time) > 1 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLog:
-    """Motion in a log, in SI units and radians; data that are not logged have no rows.
+    """The motion of an aircraft in a log, in SI units and radians; data that are not logged have no rows.
 
     source: path of the file.
     sha256: SHA-256 of the file's bytes.
     program: name of the program that flew.
     vehicle: kind of vehicle.
-    inertial: specific force forward, right and down, and the angular rates p, q and r, of the first inertial sensor,
+    inertial: specific force forward, right and down, and angular rates p, q and r, from the first inertial sensor,
         (n, 6).
     outputs: pulses of the servo outputs, us, (n, 14); the first output is in column 0.
     attitude: roll, pitch and yaw, (n, 3).
@@ -57,16 +56,17 @@ class MotionLog:
     battery: voltage, V, and current, A, (n, 2).
     modes: time and number of each flight mode.
     parameters: last value of each parameter, by name.
-    home: latitude and longitude, deg, and altitude, m AMSL, of the vehicle's last home (ORGN) or of its first position
-        on the ground; None if neither is logged.
-    program_kind: kind of program that wrote the log.
-    controls: pitch up, roll and yaw to the right as fractions of full travel, and throttle (0..1), (n, 4), in a log
-        that has them instead of pulses.
+    home: latitude and longitude (degrees) and altitude (m AMSL) of the vehicle's last logged home, or else of its first
+        position on the ground; None if neither is known.
+    program_kind: kind of program or format from which the log comes.
+    controls: commands pitch up, roll right and yaw right, as fractions of full travel, and throttle (0..1), (n, 4), in
+        a log that has them instead of `outputs`.
     angles: True for each of the first three controls that is a deflection, rad, instead of a fraction.
-    elevons: True if elevons make the controls.
-    hovering: start and end of each period on lifting motors that the log itself names, s.
-    span: first and last time of the part of the file that was read, s of the log.
-    missing: quantities of "inertial" and "outputs" that a table of columns lacks.
+    elevons: True if the aircraft has elevons.
+    hovering: start and end of each period on lifting motors that the log states, s.
+    span: first and last time of the part of the log that was read, on the log's clock, s.
+    missing: names of the quantities in `inertial` and `outputs` that a table of columns lacks, keyed by the field's
+        name.
     """
 
     source: str
@@ -95,17 +95,17 @@ class MotionLog:
 
     @property
     def surface_commands(self) -> Samples:
-        """Commands to the surfaces: the controls if they are logged, or else the servo outputs."""
+        """`controls` if they are logged, or else `outputs`."""
         return self.controls if len(self.controls.time) else self.outputs
 
 
 def find_first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return where a vehicle first stood still: latitude, longitude (deg) and altitude (m).
+    """Return latitude, longitude (degrees) and altitude (m) where a vehicle first stood still.
 
-    Returns None if it never stood still.  Rows outside the times of the velocities, and rows without a valid position,
+    Return None if it never stood still.  Rows outside the times of the velocities, and rows without a valid position,
     are ignored.
 
-    position: latitude and longitude (deg) and altitude (m), (n, 3).
+    position: latitude and longitude (degrees) and altitude (m), (n, 3).
     velocity: ground velocity, m/s, (n, 3).
 
     >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
@@ -125,7 +125,11 @@ def find_first_ground_position(position: Samples, velocity: Samples) -> tuple[fl
 
 
 def sort_samples(time: Floats, values: Floats) -> Samples:
-    """Sort rows by time, and discard rows with a repeated time or with values that are not finite."""
+    """Sort rows by time, and discard rows with a repeated time or with a value that is not finite.
+
+    time: times, s, (n,).
+    values: values of the rows, (n, k).
+    """
     is_finite = np.isfinite(time) & np.isfinite(values).all(axis=1)
     time, values = time[is_finite], values[is_finite]
     order = np.argsort(time, kind="stable")

@@ -1,4 +1,7 @@
-"""Read the motion of an aircraft from a log: ArduPilot's logs here, PX4's logs in `logs.importers.px4_motion`."""
+"""Read the motion of an aircraft from a log of any format.
+
+ArduPilot's dataflash logs are read in this module.
+"""
 
 import hashlib
 import math
@@ -43,7 +46,8 @@ _INSTANCES = ("I", "C", "Inst", "Instance")
 def read_motion(path: Path) -> MotionLog:
     """Read the motion of an aircraft from a log of any supported format.
 
-    Raises LogError for a file that cannot be read, or that is not a log of inertial sensors and servo outputs.
+    The content of the file or its suffix shows the format.  Raises LogError for a file that cannot be read, or that is
+    not a log of inertial sensors and servo outputs, and MissingExtraError if the extra for its format is not installed.
     """
     try:
         if not path.is_file():
@@ -83,14 +87,14 @@ def read_motion(path: Path) -> MotionLog:
 
 
 class _DataflashMotionReader:
-    """Reader of the motion in one ArduPilot dataflash log."""
+    """The reader of the motion in one ArduPilot dataflash log."""
 
     def __init__(self, index: Dataflash, source: str, digest: str) -> None:
-        """Take the index of a log, its path, and the SHA-256 of its bytes."""
+        """Prepare to read a log; source: path of the log, digest: SHA-256 of its bytes."""
         self._index, self._source, self._digest = index, source, digest
 
     def read(self) -> MotionLog:
-        """Return the motion of the aircraft."""
+        """Read the motion of the aircraft."""
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
         program, vehicle = find_firmware_and_vehicle(texts, self._index.messages("VER"))
@@ -147,7 +151,10 @@ class _DataflashMotionReader:
         )
 
     def _select_messages(self, name: str) -> Messages:
-        """Return the messages with a name; only those of the first sensor or estimator that logs them."""
+        """Return the messages with a name.
+
+        If several sensors or estimators log them, only those of the first one are returned.
+        """
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
@@ -156,11 +163,11 @@ class _DataflashMotionReader:
         return messages
 
     def _read_first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
-        """Read a quantity that several messages state from the first of them that the log contains.
+        """Read a quantity that several messages can state from the first of them that the log contains.
 
         The result has no rows if the log contains none of them.  Servo outputs that RCOU lacks are 0.
 
-        choices: the messages in the order of preference, each with its name and the names of its fields.
+        choices: name and fields of each message, in the order of preference.
         scale: factor by which the values are multiplied.
         """
         for name, columns in choices:

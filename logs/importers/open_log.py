@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 class LogFormat(NamedTuple):
-    """Format of a log.
+    """A format of logs.
 
-    name: name for messages.
+    name: name in messages.
     suffixes: suffixes of the format's files, in lower case.
-    content: regular expression for the first bytes of a file.
-    reader: module and function of the reader, which takes a path, returns a `RawLog` and raises LogError; it is
-        imported when needed, because each reader needs another library.
+    content: regular expression that matches in the first bytes of the format's files.
+    reader: module and function of the reader, which takes a path, returns a `RawLog` and raises LogError.  It is
+        imported only when needed, because each reader needs another library.
     extra: planfly extra with the reader's library; "" if no extra is needed.
     """
 
@@ -58,13 +58,13 @@ SUFFIXES = tuple(suffix for known in FORMATS for suffix in known.suffixes)
 _AS_TEXT = rb"\A\s*FMT, ?128,"
 # Suffix of a dataflash log as text.
 _TEXT_SUFFIX = ".log"
-# Largest log; a day of a vehicle that logs everything takes less.
+# Largest size of a log, bytes; a day of a vehicle that logs everything takes less.
 MAX_BYTES = 2 * 2**30
 _HEAD = 512
 
 
 def is_imported_log(path: Path) -> bool:
-    """Return True if a file has the suffix of another program's log.
+    """Return True if a path has the suffix of another program's log.
 
     >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
@@ -78,9 +78,10 @@ def _find_suffix(path: Path) -> str:
 
 
 def open_log(path: Path) -> "RawLog":
-    """Read a log of another program.
+    """Read a log of another program in any supported format.
 
-    Raises LogError for other files, and for logs without positions and times.
+    Raises LogError for a file that cannot be read, a file that is not a log, and a log without positions or times.
+    Raises MissingExtraError if the extra for its format is not installed.
 
     >>> open_log(Path("nothing.BIN"))  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -119,6 +120,8 @@ def detect_log_format(path: Path, head: bytes) -> LogFormat:
 
     If they contradict each other, the first bytes decide.  Raises LogError if neither is known, and for a dataflash log
     that was converted to text.
+
+    head: first bytes of the file.
 
     >>> detect_log_format(Path("flight.igc"), b"<gpx>").name, detect_log_format(Path("a.BIN"), bytes(9)).name
     ('.gpx', 'ArduPilot .BIN')

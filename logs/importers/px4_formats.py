@@ -1,8 +1,8 @@
-"""Count the fields in the message formats of a PX4 log, before pyulog creates them.
+"""Count the fields in the formats of a PX4 log before pyulog creates them, to refuse too many.
 
-A format may contain other formats, and arrays of them (PX4, "ULog File Format", Message Format).  Forty formats that
-each contain the next one twice take a kilobyte, but define 2^40 fields.  pyulog creates every field of a topic when the
-log declares the topic.
+pyulog creates all fields of a topic when the log declares the topic.  A format may contain other formats, and arrays of
+them (PX4, "ULog File Format", Message Format): forty formats that each contain the next one twice take a kilobyte, but
+define 2^40 fields.
 """
 
 import re
@@ -21,9 +21,9 @@ _PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16
 
 
 class MessageFormats:
-    """Formats of a log up to the current record, and the number of fields in its topics.
+    """The formats and the number of topic fields that the records of a log have declared so far.
 
-    source: name of the log for messages.
+    source: path of the log, for messages.
     """
 
     def __init__(self, source: str) -> None:
@@ -34,7 +34,7 @@ class MessageFormats:
         self._total = 0
 
     def add_format(self, text: str) -> None:
-        """Add a format, given as its name, a colon and its fields.
+        """Add a format from its text: its name, a colon, and its fields, each followed by a semicolon.
 
         >>> formats = MessageFormats("a.ulg")
         >>> formats.add_format("wind:uint64_t timestamp;float[3] wind;")
@@ -48,9 +48,9 @@ class MessageFormats:
         self._counts.clear()
 
     def add_topic(self, name: str) -> None:
-        """Add a topic with the format of this name.
+        """Count the fields of a topic that has the format with this name.
 
-        Raises LogError if the topics of the log then have more than `MAX_FIELDS` fields.
+        Raises LogError if all topics so far have more than `MAX_FIELDS` fields.
         """
         self._total += self.count_fields(name)
         if self._total > MAX_FIELDS:
@@ -58,18 +58,18 @@ class MessageFormats:
             raise LogError(f"{self._source}: not a readable PX4 log: {reason}", file=self._source)
 
     def count_fields(self, name: str) -> int:
-        """Return the number of fields of a format, including nested formats.
+        """Return the number of fields of a format, with the fields of nested formats.
 
-        The number is above `MAX_FIELDS` for a format that contains itself.
+        It is above `MAX_FIELDS` for a format that contains itself.
         """
         return self._count(name, frozenset())
 
     def _count(self, name: str, outer_names: frozenset[str]) -> int:
         """Return the number of fields of a format; 1 for a plain type, and for a name without a format.
 
-        The number is greater than `MAX_FIELDS` if the format has too many fields, or contains itself.
+        Counting ends above `MAX_FIELDS`.  A format that contains itself has more than `MAX_FIELDS` fields.
 
-        outer_names: names of the formats in which the format is nested.
+        outer_names: names of the formats in which this format is nested.
         """
         if name in _PLAIN or name not in self._formats:
             return 1

@@ -1,7 +1,7 @@
-"""Read PX4's logs (`.ulg`): positions, measurements and commands of the vehicle.
+"""Read PX4's logs (`.ulg`) into a `RawLog`.
 
-pyulog reads the container; damage is counted here, because pyulog only reports whether there is any.  Names of topics
-and fields follow PX4's message documentation of the current release and of older releases.
+pyulog reads the topics.  Damage is counted in this module, because pyulog only reports that there is some.  Names of
+topics and fields follow PX4's message documentation of the current release and of older releases.
 """
 
 import math
@@ -36,10 +36,10 @@ from world.silent_output import silence
 FORMAT = "PX4 log"
 # Bytes before the first record.
 _HEADER = 16
-# Letters of all kinds of records (PX4, "ULog File Format").
+# Letters of all types of records (PX4, "ULog File Format").
 _LETTERS = b"BFIMPQARDLCSO"
-# Topics with the wind, of which the first with rows is read: from the state estimator, from the airspeed selector (the
-# only one in logs of PX4 1.12 and 1.13), and of releases before 1.12.
+# Topics with the wind, of which the first with rows is read: of the state estimator, of the airspeed selector (the only
+# one in logs of PX4 1.12 and 1.13), and of releases before 1.12.
 WIND_TOPICS = ("wind", "airspeed_wind", "wind_estimate")
 # Current that marks a sample without a measurement, A (battery_status.msg).
 CURRENT_NOT_MEASURED_A = -1.0
@@ -61,23 +61,29 @@ _TOPICS = [
     "home_position",
     "mission_result",
 ]
-# Vehicle by vehicle_status.vehicle_type.
+# Kind of vehicle by vehicle_status.vehicle_type.
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
 _AMSL = 0
 _OVER_HOME = 3
-# Largest absolute latitude and longitude, deg, and altitude, m, of a valid home.
+# Largest absolute latitude and longitude (degrees) and altitude (m) of a valid home.
 _HOME_LIMITS = np.array([90.0, 180.0, 10_000.0])
-# Numbers of items are 16 bits.
+# Largest number of an item, which has 16 bits.
 _MAX_ITEMS = 65_535
 
 
 def read_px4(path: Path) -> RawLog:
-    """Read a PX4 log.  Raises LogError for a log that pyulog cannot read, and for a log without positions."""
+    """Read a PX4 log into a `RawLog`.
+
+    Raises LogError for a log that pyulog cannot read, and for a log without positions.
+    """
     return open_topics(path, _TOPICS).to_raw_log()
 
 
 def open_topics(path: Path, names: list[str]) -> "Topics":
-    """Read the named topics of a log.  Raises LogError for a file that pyulog cannot read."""
+    """Read the topics of a log that have one of the given names.
+
+    Raises LogError for a file that pyulog cannot read.
+    """
     try:
         # pyulog prints errors on the terminal.
         with silence(), path.open("rb") as file:
@@ -94,20 +100,25 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
 
 
 class _FormatCheckingFile:
-    """File for pyulog that checks the formats and corrects pyulog's backward seeks after short reads.
+    """A file from which pyulog reads.
 
-    pyulog steps back by the stated length of a record even if fewer bytes were read, and would read the end of a
-    damaged file again and again; this file steps back only by the bytes that were read.  pyulog first reads the three
-    bytes of a record's length and letter, and then its content.
+    It checks the formats, and corrects pyulog's backward seeks after short reads.  pyulog steps back by the stated
+    length of a record even if fewer bytes were read, and would read the end of a damaged file again and again.  This
+    file steps back only by the bytes that were read.
+
+    pyulog first reads the three bytes of a record's length and letter, and then its content.
     """
 
     def __init__(self, file: BinaryIO, source: str) -> None:
-        """Wrap an open file, whose path `source` is named in messages."""
+        """Read from an open file; source: its path, for messages."""
         self._file, self._missing, self._letter = file, 0, b""
         self._formats = MessageFormats(source)
 
     def read(self, size: int) -> bytes:
-        """Read bytes, and check the contents of records with formats and topics."""
+        """Read up to `size` bytes, and check the content of records with formats and topics.
+
+        Raises LogError if the topics have too many fields.
+        """
         data = self._file.read(size)
         self._missing = size - len(data)
         if self._letter == b"F":
@@ -119,7 +130,10 @@ class _FormatCheckingFile:
         return data
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Change the position; a relative seek is corrected by the bytes missing from the last read."""
+        """Change the position and return it.
+
+        A relative seek is corrected by the bytes missing from the last read.
+        """
         missing = self._missing if whence == 1 else 0
         self._missing = 0
         return self._file.seek(offset + missing, whence)
@@ -134,12 +148,13 @@ class _FormatCheckingFile:
 
 
 def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) -> Damage:
-    """Find the damage of a PX4 log.
+    """Count the damaged places and the lost bytes of a PX4 log.
 
-    A log is a sequence of records, each with its length, the letter of its kind and its content.  Bytes that belong to
+    A log is a sequence of records, each with its length, the letter of its type, and its content.  Bytes that belong to
     no record with a known letter are damaged.  The last record may be cut.
 
     data: bytes of the log, (n,).
+    release_memory: function that releases the memory of the bytes read so far; called regularly.
 
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
@@ -153,7 +168,7 @@ def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) 
 
 
 # Indices of the state of a walk over records.
-# Next byte.
+# Number of the next byte.
 _NEXT_BYTE = 0
 # Number of damaged places, where no record begins.
 _DAMAGED_PLACES = 1
@@ -167,13 +182,13 @@ _IS_CUT = 4
 
 @compiled
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
-    """Walk over the records up to byte ``stop``, and count damaged places and lost bytes.
+    """Walk over the records that begin before byte `stop`, and count the damage in `state`.
 
-    The walk goes from record to record by their lengths.  In a damaged place, where no valid record begins, it goes on
-    byte by byte to the next valid record.
+    The walk goes from record to record by their lengths.  In a damaged place, where no valid record begins, it
+    continues byte by byte to the next valid record.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
-    letters: letters of all kinds of records.
+    letters: letters of all types of records.
     """
     is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:
@@ -211,11 +226,13 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
 
 
 def _read_instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """Return fields of one instance of a topic as columns; None if the instance lacks them.
+    """Return fields of one instance of a topic as the columns of a series.
 
-    topic: name of the topic, which is stated in the result.
-    data: values of the instance by field.
-    choices: alternative groups of fields; the first group that the instance has is returned.
+    Return None if the instance lacks them.
+
+    topic: name of the topic, which becomes the source of the series.
+    data: values of each field of the instance, keyed by field name; empty for a topic that the log lacks.
+    choices: alternative groups of fields; the first group that the instance has in full is returned.
     """
     for columns in choices:
         if data and all(column in data for column in columns):
@@ -225,14 +242,18 @@ def _read_instance_table(topic: str, data: dict[str, Any], choices: Iterable[tup
 
 
 class Topics:
-    """Topics of one log, which are its messages by name.
+    """The topics of one log: its messages, grouped by their name.
 
-    A topic may have several instances, one for each sensor or battery.  Only the first one is used, except for
+    A topic may have several instances, one for each sensor or battery.  Only the first instance is used, except for
     batteries, whose currents are added up.
     """
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
-        """Collect the instances of each topic that have rows, the first instance first."""
+        """Collect the instances of each topic that have rows, in the order of their numbers.
+
+        source: path of the log.
+        damage: damage of the log's file.
+        """
         self._log, self._source, self._damage = log, source, damage
         self._instances: dict[str, list[dict[str, Any]]] = {}
         for data in sorted(log.data_list, key=lambda data: int(data.multi_id)):
@@ -241,7 +262,10 @@ class Topics:
         self._data = {name: instances[0] for name, instances in self._instances.items()}
 
     def to_raw_log(self) -> RawLog:
-        """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
+        """Return the log with all data that a verdict needs.
+
+        Raises LogError for a log without positions.
+        """
         position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
         gps = self._read_gps_position()
         velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
@@ -320,14 +344,14 @@ class Topics:
         return self._source
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
-        """Return fields of a topic's first instance as columns; None if the log lacks them.
+        """Return fields of a topic's first instance as the columns of a series; None if the log lacks them.
 
-        choices: alternative groups of fields; the first group that the topic has is returned.
+        choices: alternative groups of fields; the first group that the topic has in full is returned.
         """
         return _read_instance_table(topic, self._data.get(topic, {}), choices)
 
     def _read_gps_position(self) -> LogSeries | None:
-        """Return latitude, longitude (deg) and altitude (m AMSL) from GPS, (n, 3); None if not logged."""
+        """Return latitude, longitude (degrees) and altitude (m AMSL) from GPS, (n, 3); None if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             position = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
             if position is not None:
@@ -353,9 +377,9 @@ class Topics:
     def battery(self) -> LogSeries | None:
         """Return the mean voltage (V) of all connected batteries and the sum of their currents (A), (n, 2).
 
-        Return None for a log without batteries, or if the current of a connected battery was not measured.  Only
-        batteries with the same kind of measurement (`source`) as the first battery are used, because another kind, such
-        as by motor controllers, measures the same current again.
+        Return None if there is no battery, or if the current of a battery in use was not measured.  Only batteries with
+        the same kind of measurement (`source`) as the first battery are used, because another kind, such as
+        measurements of motor controllers, contains the same current again.
         """
         connected_batteries = []
         for data in self._instances.get("battery_status", []):
@@ -378,7 +402,7 @@ class Topics:
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
 
     def vehicle(self) -> VehicleKind:
-        """Return the kind of vehicle; a VTOL is a plane."""
+        """Return the kind of vehicle, "plane" for a VTOL; "unknown" if not logged."""
         data = self._data.get("vehicle_status", {})
         if "vehicle_type" in data:
             kinds = np.asarray(data["vehicle_type"])
@@ -391,9 +415,10 @@ class Topics:
         return "unknown"
 
     def _read_missions(self) -> Iterable[LoggedMission]:
-        """Yield the one mission of the log, with the valid items that became current: PX4 logs no other items.
+        """Yield the log's mission, with those valid items that became current: PX4 logs no other items.
 
-        The number of items comes from mission_result.  Nothing is yielded if the log has neither.
+        The total number of items comes from mission_result.  Nothing is yielded if the log has neither items nor their
+        number.
         """
         data = self._data.get("navigator_mission_item", {})
         stamps = data.get("timestamp", [0.0])
@@ -430,7 +455,7 @@ class Topics:
             yield gapless_mission
 
     def home(self) -> Home | None:
-        """Return the last valid home; None if not logged."""
+        """Return the last valid home in the log; None if there is none."""
         positions = self.table("home_position", ("lat", "lon", "alt"))
         if positions is None:
             return None
@@ -442,7 +467,10 @@ class Topics:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the last value of each parameter by name; values that are not finite numbers are left out."""
+        """Return the last value of each parameter, keyed by name.
+
+        Values that are not finite numbers are left out.
+        """
         values = dict(self._log.initial_parameters)
         values |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged parameter may be a text.
@@ -450,7 +478,7 @@ class Topics:
         return {name: value for name, value in numbers.items() if math.isfinite(value)}
 
     def program(self) -> str:
-        """Return the name and the release of the program."""
+        """Return the name of the program, and its release if logged, such as "PX4 v1.14.0"."""
         info = self._log.msg_info_dict
         name, release = str(info.get("sys_name", "PX4")), info.get("ver_sw_release")
         # The bytes of the release are, from the highest: major, minor and patch number, and kind of release.

@@ -1,8 +1,8 @@
-"""Read the motion of an aircraft from a PX4 log (`.ulg`), as `motion_log` does from ArduPilot logs.
+"""Read the motion of an aircraft from a PX4 log (`.ulg`), for an identification.
 
-All topics share one clock.  Surface deflections are taken from `actuator_servos` and the parameters of the control
+All topics share one clock.  Surface deflections come from `actuator_servos` and the parameters of the control
 allocation (CA_*), or from `actuator_controls_0` in logs of releases before 1.14.  Names follow PX4's message and
-parameter references.
+parameter references.  `logs.importers.motion_log` reads the same from ArduPilot's logs.
 """
 
 from collections.abc import Mapping
@@ -33,9 +33,9 @@ _TOPICS = [
     "spoilers_setpoint",
 ]
 NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
-# CA_AIRFRAME of a fixed wing.
+# Value of CA_AIRFRAME of a fixed wing.
 _WING = 1
-# CA_AIRFRAME of a fixed wing with additional lifting motors, which are its first rotors.
+# Value of CA_AIRFRAME of a fixed wing with additional lifting motors, which are its first rotors.
 _STANDARD_VTOL = 2
 _AIRFRAMES = {
     0: "a multirotor",
@@ -49,14 +49,14 @@ _AIRFRAMES = {
 }
 # Values of CA_SV_CSn_TYPE for surfaces that are modelled: ailerons, elevators, rudders and elevons.
 _MODELLED = frozenset({1, 2, 3, 4, 5, 6, 15})
-# Those of them that are elevons.
+# Values for elevons.
 _ELEVONS = frozenset({5, 6})
 # Values for surfaces that cannot be modelled, because they act about several axes.
 _MIXED = {7: "a V-tail", 8: "a V-tail", 12: "a custom surface", 13: "an A-tail", 14: "an A-tail"}
 # Values for surfaces that may be ignored if they do not move.
 _FLAPS = {9: "flap", 10: "flap", 11: "airbrake", 17: "spoiler", 18: "spoiler"}
-# Flaps and spoilers may also deflect a surface of another type, by the factor CA_SV_CSn_FLAP or CA_SV_CSn_SPOIL: their
-# name in messages, and the topic with their setpoint.
+# Flaps and spoilers may also deflect a surface of another type, by the factor CA_SV_CSn_FLAP or CA_SV_CSn_SPOIL.  By
+# the end of that name: their name in messages, and the topic with their setpoint.
 _ALSO_MOVE = {"FLAP": ("flaps", "flaps_setpoint"), "SPOIL": ("spoilers", "spoilers_setpoint")}
 _AXES = ("P", "R", "Y")
 # A flap moves in flight if its largest and its smallest output (-1..1) differ by more than this.
@@ -69,7 +69,7 @@ _ARMED = 2
 _SERVOS = 8
 # Greatest number of motors in the topics.
 _MOTORS = 12
-# ArduPlane's parameters by PX4's names, with conversion factors.
+# ArduPlane's name of a parameter, and the factor to its unit, by PX4's name.
 _PARAMETERS: Mapping[str, tuple[str, float]] = {
     "FW_AIRSPD_MIN": ("AIRSPEED_MIN", 1.0),
     "FW_AIRSPD_TRIM": ("AIRSPEED_CRUISE", 1.0),
@@ -82,9 +82,9 @@ _PARAMETERS: Mapping[str, tuple[str, float]] = {
 def read_px4_motion(path: Path, digest: str) -> MotionLog:
     """Read the motion of an aircraft from a PX4 log.
 
-    digest: SHA-256 of the file's bytes.
+    Raises LogError for a file that cannot be read, and for control surfaces or motors that cannot be modelled.
 
-    Raises LogError for a file that cannot be read, and for control surfaces that cannot be modelled.
+    digest: SHA-256 of the file's bytes.
     """
     topics = open_topics(path, _TOPICS)
     with np.errstate(all="ignore"):
@@ -138,16 +138,17 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 def _read_samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
     """Return fields of a topic, sorted by time; no rows if the log lacks the topic or the fields.
 
-    choices: alternative groups of fields; the first group that the topic has is returned.
+    choices: alternative groups of fields; the first group that the topic has in full is returned.
     """
     table = topics.table(topic, *choices)
     return NO_SAMPLES if table is None else sort_samples(table.time, table.values)
 
 
 def _read_inertial(topics: Topics) -> Samples:
-    """Return specific force (m/s²) and angular rates (rad/s), (n, 6).
+    """Read specific force (m/s²) and angular rates (rad/s) about the body axes, (n, 6).
 
-    They come from the inertial sensors, or else from the two topics with filtered values.
+    There are no rows if they are not logged.  They come from the inertial sensors, or else from the two topics with
+    filtered values.
     """
     force = tuple(f"accelerometer_m_s2[{k}]" for k in range(3))
     rates = tuple(f"gyro_rad[{k}]" for k in range(3))
@@ -167,9 +168,9 @@ def _read_inertial(topics: Topics) -> Samples:
 
 
 def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Return calibrated airspeed, m/s, (n, 1), and the ratio of true to calibrated airspeed, (k, 1).
+    """Read the calibrated airspeed, m/s, (n, 1), and the ratio of true to calibrated airspeed, (k, 1).
 
-    Rows whose airspeed is not from a sensor are left out; rows up to 1 m/s have no ratio.
+    Rows whose airspeed does not come from a sensor are left out.  The ratio has no rows at airspeeds up to 1 m/s.
     """
     # PX4 logs calibrated airspeed since 1.12, and equivalent airspeed before; both are equal at these speeds.
     choices = [(speed, "true_airspeed_m_s") for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
@@ -192,12 +193,16 @@ def _read_airspeed(topics: Topics) -> tuple[Samples, Samples]:
 
 
 def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
-    """Return pitch, roll, yaw (fractions of travel) and throttle, (n, 4), and True if there are elevons.
+    """Read pitch, roll, yaw (fractions of full travel) and throttle, (n, 4), and the elevon flag.
 
-    Controls are positive up or to the right.  The parameters CA_SV_CSn_TRQ_* of a surface state its effect on pitch,
-    roll and yaw.  The control about an axis is the mean deflection of all surfaces, weighted by these effects.  The
-    throttle is the mean of the forward motors.  Logs of releases before 1.14 contain the controls themselves, which are
-    then returned; without them there are no rows.  Raises LogError for surfaces that cannot be modelled.
+    The flag is True if the aircraft has elevons.  Controls are positive for pitch up, roll right and yaw right.  The
+    control about an axis is the mean deflection of all surfaces, weighted by their effects on that axis, which the
+    parameters CA_SV_CSn_TRQ_* state.  The throttle is the mean output of the forward motors.  Logs of releases before
+    1.14 contain the controls themselves, which are then returned.  There are no rows if the log has neither.
+
+    Raises LogError for an airframe other than a plane, and for surfaces or motors that cannot be modelled.
+
+    parameters: parameters of the log, keyed by name.
     """
     servos = _read_actuators(topics, "actuator_servos", _SERVOS)
     motors = _read_actuators(topics, "actuator_motors", _MOTORS)
@@ -254,13 +259,16 @@ def _read_controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Sam
 
 
 def _find_forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
-    """Return the indices of the forward-thrust motors.
+    """Return the indices of the motors that push forward.
 
-    A VTOL's forward motors are the rotors whose axis is more forward than up. Any other aircraft has only forward
-    motors: those that CA_ROTOR_COUNT counts or, if it is absent or 0, those with a recorded output.
+    On a VTOL, they are the rotors whose axis points more forward than up.  Any other aircraft has only forward motors:
+    as many as CA_ROTOR_COUNT states or, if it is absent or 0, those with a recorded output.
 
-    Raises LogError for a VTOL without a forward motor. The error names CA_ROTOR_COUNT, because no single rotor's axis
+    Raises LogError for a VTOL without a forward motor; the error names CA_ROTOR_COUNT, because no single rotor's axis
     is at fault.
+
+    airframe: value of CA_AIRFRAME.
+    motors: outputs of the motors, (n, `_MOTORS`).
     """
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:
@@ -278,9 +286,9 @@ def _find_forward_motors(topics: Topics, airframe: int, parameters: Mapping[str,
 
 
 def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Return the outputs of the actuators in a topic, (n, size), by time; no rows without the topic.
+    """Read the outputs of the first `size` actuators in a topic, sorted by time, (n, size).
 
-    NaN stands for an unused or stopped actuator.
+    There are no rows if the log lacks the topic.  The output of an unused or stopped actuator is NaN.
     """
     table = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if table is None:
@@ -291,8 +299,9 @@ def _read_actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 
 def _make_parameter_error(topics: Topics, field: str, value: float, message: str) -> LogError:
-    """Return the error for a parameter of surfaces or motors that cannot be modelled.
+    """Return the error for a parameter that describes surfaces or motors which cannot be modelled.
 
-    message: reason, shown after name and value.
+    field, value: name and value of the parameter.
+    message: reason, which follows name and value.
     """
     return LogError(f"{topics.source}: {field} {value:g}: {message}", file=topics.source, field=field, value=value)

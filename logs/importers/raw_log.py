@@ -1,4 +1,4 @@
-"""Define the content of an imported log in SI units, common to the logs of all programs."""
+"""Define the data of an imported log in one form, in SI units, for the logs of all programs."""
 
 import math
 from collections.abc import Mapping
@@ -26,18 +26,18 @@ COLUMNS = {
     "throttle": ("share",),
     "height": ("up",),
 }
-# Longest time for which one sample of the current is used, s.
+# Longest time for which a current is assumed to have flowed, s.
 _MAX_SAMPLE_TIME_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class LogSeries:
-    """Rows of one quantity, such as position or attitude, in the order of the file.
+    """The rows of one quantity, such as position or attitude, in the order of the file.
 
     source: name of the logged message, such as "POS" or "vehicle_global_position".
     time: times on the log's clock, as in the file, s, (n,).
-    values: one column for each name in `COLUMNS`, (n, k): deg for latitude and longitude, rad for attitude, and m, m/s,
-    A and Wh for other quantities.
+    values: one column for each name in `COLUMNS`, (n, k): degrees for latitude and longitude, rad for attitude, m, m/s,
+        A, Wh, and a fraction from 0 to 1 for the throttle.
     """
 
     source: str
@@ -48,7 +48,7 @@ class LogSeries:
 def with_used_energy(battery: LogSeries) -> LogSeries:
     """Compute the energy that a battery delivered since the first row, from its voltage and current.
 
-    Returns the current (A) and the energy used (Wh), (n, 2).  A charging current becomes 0.  After a pause in the log
+    Return the current (A) and the energy used (Wh), (n, 2).  A charging current becomes 0.  After a pause in the log,
     the current is assumed to have flowed for at most `_MAX_SAMPLE_TIME_S`.
 
     battery: voltage (V) and current (A), (n, 2).
@@ -65,9 +65,9 @@ def with_used_energy(battery: LogSeries) -> LogSeries:
 
 @dataclass(frozen=True, slots=True)
 class HeightSource:
-    """Altitudes from one of several sources in a log.
+    """Altitudes from another source in a log than its positions.
 
-    name: name of the source.
+    name: name of the source, such as "GPS.Alt".
     datum: vertical datum of the altitudes.
     series: altitudes, m, (n, 1).
     """
@@ -79,9 +79,9 @@ class HeightSource:
 
 @dataclass(frozen=True, slots=True)
 class ModeChange:
-    """Change to a flight mode.
+    """A change to another flight mode.
 
-    time: time of the change, s.
+    time: time of the change on the log's clock, s.
     name: name of the new mode.
     automatic: True if the vehicle follows its mission in this mode.
     """
@@ -93,10 +93,11 @@ class ModeChange:
 
 @dataclass(frozen=True, slots=True)
 class LoggedMission:
-    """Mission that the vehicle received, as logged.
+    """A mission of the vehicle, as logged.
 
-    time: time from which the vehicle had it, s.
-    origin: name of the log messages with the mission, such as "CMD", "MISSION_ITEM_INT" or "declared task".
+    time: time from which the vehicle had the mission, s.
+    mission: the mission.
+    origin: name of the log messages with the mission, such as "CMD", "mission items" or "declared task".
     with_heights: True if the items state altitudes.
     missing: items that the log lacks; None for a complete mission.  An incomplete mission is the longest run of items
         with consecutive numbers, and may have fewer than two items.
@@ -111,24 +112,25 @@ class LoggedMission:
 
 @dataclass(frozen=True, slots=True)
 class RawLog:
-    """Log as its reader returns it; nothing is sorted or cleaned yet.
+    """A log as its reader returns it; nothing is sorted or cleaned yet.
 
     source: path of the log.
     format: name of the format, such as "ArduPilot dataflash log".
-    program: name of the program in the log, "" if not logged.
+    program: name of the program that flew; "" if not logged.
     vehicle: kind of vehicle.
-    series: series by the names of `COLUMNS` except "height"; a name that is missing is not in the log.
-    heights: altitudes other than the altitude of the position, for comparison.
+    series: series of each quantity, keyed by its name in `COLUMNS` except "height"; quantities that are not logged are
+        absent.
+    heights: altitudes from other sources than the position, for comparison.
     datum: vertical datum of the position's altitude.
     modes: mode changes in the order of the file; empty if not logged.
     missions: missions in the order of the file.
-    parameters: last value of each parameter, by name.
+    parameters: last value of each parameter of the autopilot, keyed by name.
     events: time (s) and text of the vehicle's messages.
-    clock: "boot" if the time counts from when the vehicle was switched on, "start" if it counts from the first row.
-    utc_start: time 0 of the log's clock, s since 1970; NaN if unknown.
-    clock_jumps: times at which the log's clock went back permanently, s.
+    clock: "boot" if time 0 is when the vehicle was switched on, "start" if it is the first row.
+    utc_start: UTC time at time 0 of the log's clock, s since 1970; NaN if unknown.
+    clock_jumps: times at which the log's clock went back permanently, s; the reader has removed these jumps.
     damage: parts of the file that could not be read.
-    sha256: SHA-256 of the bytes of all files of a log with several files; "" for a log of one file.
+    sha256: SHA-256 of all files of a log in several files; "" for a log in one file.
     """
 
     source: str
@@ -167,9 +169,9 @@ EXAMPLE_TAIL_S = 2.0
 
 
 def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALTITUDE_M) -> RawLog:
-    """Make a log of a flight that leads 1 km north and then 1 km east, with a sharp corner, for examples.
+    """Make an example log of a flight along two legs, 1 km north and then 1 km east, with a sharp corner.
 
-    lat, lon, up: start of the flight, deg and m AMSL.
+    lat, lon, up: first waypoint, degrees and m AMSL.
 
     >>> log = example_raw_log()
     >>> log.program, log.modes[0].name, len(log.missions[0].mission.items)
@@ -184,7 +186,7 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
     zeros, boot_time = np.zeros(time.size), time + 20.0
 
     def make_series(name: str, *columns: np.ndarray) -> LogSeries:
-        """Return a series of columns at all times of the flight."""
+        """Make a series of one value for each time of the flight in each column; name: source of the series."""
         return LogSeries(name, boot_time, np.column_stack(columns))
 
     waypoints = ((0.0, 0.0), (0.0, EXAMPLE_LEG_M), (EXAMPLE_LEG_M, EXAMPLE_LEG_M))

@@ -1,7 +1,7 @@
-"""Read telemetry logs (`.tlog`) of ground stations: messages of ArduPlane or PX4, and sent missions.
+"""Read telemetry logs (`.tlog`) of ground stations, of ArduPlane or PX4, into a `RawLog`.
 
-The packets are found and decoded first, then sorted by the sending system, then read as a `RawLog`.  The clock is the
-vehicle's, `time_boot_ms`; messages without it are placed by their time of reception.
+The packets are found and decoded, grouped by the sending system, and then converted.  The clock is the vehicle's
+(`time_boot_ms`); messages without this time are placed by their time of reception.
 """
 
 import math
@@ -60,19 +60,19 @@ _V2_FRAME = 12
 # Bytes of the signature of a MAVLink 2 packet.
 _SIGNATURE = 13
 _SIGNED = 0x01
-# Earliest time that a telemetry log may hold, from 2000, us since 1970.
+# Earliest valid time in a telemetry log: 2000, us since 1970.
 _EARLIEST_US = 946_684_800_000_000
-# Latest time that a telemetry log may hold, to 2100, us since 1970.
+# Latest valid time in a telemetry log: 2100, us since 1970.
 _LATEST_US = 4_102_444_800_000_000
 
 
 @dataclass
 class TelemetryReader:
-    """Decoder of a log's messages of the wanted kinds, which also counts unreadable places.
+    """The decoder of a log's messages; it decodes only wanted messages, and counts unreadable places.
 
     data: bytes of the log.
-    wanted: message numbers to decode.
-    release_memory: called regularly, to release the memory of the bytes that were read.
+    wanted: numbers of the messages to decode.
+    release_memory: function that releases the memory of the bytes read so far; called regularly.
     places, size: number of unreadable places, and their total size in bytes.
     cut: True if the log ends within a record.
     unreadable: number of wanted messages that could not be decoded.
@@ -88,7 +88,7 @@ class TelemetryReader:
     _decoder: Any = field(default_factory=lambda: dialect.MAVLink(None))
 
     def messages(self) -> Iterator[tuple[float, Any]]:
-        """Yield each wanted message in the order of the file, with its time of reception, s since 1970."""
+        """Yield each wanted message with its time of reception, s since 1970, in the file's order."""
         position, end, is_in_record, piece_end = 0, len(self.data), True, PIECE_BYTES
         while position + _STAMP.size + _V1_FRAME <= end:
             if position >= piece_end:
@@ -131,7 +131,7 @@ class TelemetryReader:
             position += length
 
     def damage(self) -> Damage:
-        """Return the damage found so far."""
+        """Return the damage found so far; all damage once `messages` has ended."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
 
@@ -139,7 +139,7 @@ class TelemetryReader:
 # Messages of one system in a telemetry log: frequent numeric messages are kept as rows, so that a long log stays small.
 
 
-# Kinds of messages that are sent many times a second, with the fields of them that are kept.
+# Messages that are sent many times a second, with those of their fields that are kept.
 NUMBERS = {
     "GLOBAL_POSITION_INT": ("lat", "lon", "alt", "vx", "vy", "vz"),
     "ATTITUDE": ("roll", "pitch", "yaw"),
@@ -152,17 +152,17 @@ NUMBERS = {
     "SYS_STATUS": ("current_battery", "voltage_battery"),
     "BATTERY_STATUS": ("current_battery", "energy_consumed"),
 }
-# Values of a battery's fields that mark them as not measured (MAVLink, common.xml).
+# Value that marks a battery field as not measured (MAVLink, common.xml), by field.
 NOT_MEASURED = {"voltage_battery": 65535.0, "current_battery": -1.0, "energy_consumed": -1.0}
-# Largest number of messages that are kept of each other kind.
+# Largest number of messages that are kept of each name that is not in `NUMBERS`.
 _MAX_MESSAGES = 200_000
 
 
 class BootClock(NamedTuple):
-    """Clock that starts when the vehicle is switched on.
+    """The clock that starts when the vehicle is switched on.
 
-    offset: time 0 of this clock, s since 1970.
-    jumps: times at which the vehicle was switched on again, s.
+    offset: UTC time at time 0 of this clock, s since 1970.
+    jumps: times on this clock at which the vehicle was switched on again, s.
     time: time of each message on this clock, s, (n,).
     """
 
@@ -172,7 +172,7 @@ class BootClock(NamedTuple):
 
 
 class SystemMessages:
-    """Messages sent by one system."""
+    """The messages that one system sent, in the order of their reception."""
 
     def __init__(self) -> None:
         """Start without messages."""
@@ -186,7 +186,10 @@ class SystemMessages:
         return len(self._stamps)
 
     def add(self, stamp: float, message: Any) -> None:
-        """Add a message that was received at ``stamp`` (s since 1970)."""
+        """Add a message; stamp: its time of reception, s since 1970.
+
+        Of a name that is not in `NUMBERS`, only the first `_MAX_MESSAGES` are kept.
+        """
         name, number = message.get_type(), len(self._stamps)
         boot = getattr(message, "time_boot_ms", None)
         self._stamps.append(stamp)
@@ -202,22 +205,23 @@ class SystemMessages:
         rows.extend(float(getattr(message, field)) for field in fields)
 
     def table(self, name: str) -> Floats:
-        """Return the messages of a kind in `NUMBERS` as rows, (n, 1 + fields).
+        """Return all messages with a name in `NUMBERS` as rows, (n, 1 + k).
 
-        A row is the message's index, then its fields.
+        A row is the index among all messages, then the k fields.
         """
         rows = self._rows.get(name)
         return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
 
     def named(self, name: str) -> list[tuple[int, Any]]:
-        """Return the messages of a kind that is not in `NUMBERS`, each with its index among all messages."""
+        """Return all messages with a name that is not in `NUMBERS`, each with its index among all messages."""
         return self._named.get(name, [])
 
     def boot_clock(self) -> BootClock:
-        """Return the clock of the vehicle, with the time of each message.
+        """Compute the vehicle's clock, and the time of each message on it.
 
-        A message that does not state the vehicle's time gets the time of the last message before it that does, plus the
-        time between their receptions.  If no message states it, the clock starts at the first reception.
+        A message that does not state the vehicle's time gets the time of the nearest earlier message that does (or else
+        of the first), plus the time between their receptions.  If no message states it, the clock starts at the first
+        reception.
         """
         stamps, time = np.array(self._stamps), np.array(self._boots)
         known_rows = np.flatnonzero(np.isfinite(time))
@@ -240,9 +244,9 @@ _KEPT_MESSAGES = ("HEARTBEAT", "PARAM_VALUE", "STATUSTEXT", "HOME_POSITION")
 _MISSION_MESSAGES = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
 _WANTED_MESSAGES = frozenset((*_KEPT_MESSAGES, *_MISSION_MESSAGES, *NUMBERS))
 _NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED_MESSAGES)
-# Largest number of mission items that are kept: far more than a station sends.
+# Largest number of messages on missions that are kept: far more than a station sends.
 _MAX_ITEMS = 200_000
-# Vehicle kinds by MAV_TYPE; a type that is not listed is unknown.
+# Kind of vehicle by MAV_TYPE; a type that is not listed is unknown.
 _TYPES: dict[int, VehicleKind] = {
     1: "plane",
     16: "plane",
@@ -267,7 +271,7 @@ _TYPES: dict[int, VehicleKind] = {
     11: "boat",
     12: "submarine",
 }
-# MAV_TYPE of ground stations, onboard computers, gimbals, receivers for other traffic.
+# Values of MAV_TYPE of ground stations, onboard computers, gimbals, and receivers for other traffic.
 _NO_VEHICLES = (6, 18, 26, 27)
 _NOT_AUTOPILOTS = (8, 18)
 _PX4 = 12
@@ -276,13 +280,18 @@ _MISSION_TYPE = 0
 
 
 def read_telemetry(path: Path) -> RawLog:
-    """Read a telemetry log.  Raises LogError for a log without positions or without a vehicle."""
+    """Read a telemetry log into a `RawLog`.
+
+    Raises LogError for a log without a vehicle or without positions.
+    """
     messages, damage = read_vehicle_messages(path)
     return messages.to_raw_log(damage)
 
 
 def read_vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
-    """Return the messages of the vehicle with the most messages, and the damage of the file.
+    """Read the messages of the vehicle that sent the most messages.
+
+    Return them and the damage of the file.
 
     Raises LogError for a log without a vehicle.
     """
@@ -311,12 +320,13 @@ def _is_vehicle(message: Any) -> bool:
 
 
 class VehicleMessages:
-    """Messages of one vehicle, with times on the vehicle's clock."""
+    """The messages of one vehicle, with times on the vehicle's clock."""
 
     def __init__(self, messages: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
-        """Take the messages that the vehicle sent, and the messages that transfer missions, from any sender.
+        """Convert the times of all messages to the vehicle's clock.
 
-        items: messages that transfer missions, each with its time of reception, s since 1970.
+        messages: messages that the vehicle sent.
+        items: messages on missions from all senders, each with its time of reception, s since 1970.
         source: path of the log.
         """
         self._source, self._messages = source, messages
@@ -329,7 +339,10 @@ class VehicleMessages:
         }
 
     def to_raw_log(self, damage: Damage) -> RawLog:
-        """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
+        """Return the log with all data that a verdict needs.
+
+        Raises LogError for a log without positions.
+        """
         series = {name: log_series for name, log_series in self._read_series() if log_series is not None}
         heartbeats = [message for _, message in self._named_messages.get("HEARTBEAT", []) if _is_vehicle(message)]
         if "position" not in series:
@@ -383,7 +396,9 @@ class VehicleMessages:
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return fields of a message in the units in which they were sent; None if the message was never sent.
+        """Return fields of a message as the columns of a series, in the units of the message.
+
+        Return None if the message was never sent.
 
         name: name of the message, a key of `NUMBERS`.
         columns: names of the fields.
@@ -395,7 +410,10 @@ class VehicleMessages:
         return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
     def _read_series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
+        """Yield the name and the data of each series of a `RawLog`.
+
+        A series that the log lacks is None, or is not yielded.
+        """
         positions = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if positions is not None:
             is_known = (positions.values[:, :2] != 0.0).any(axis=1)
@@ -442,7 +460,7 @@ class VehicleMessages:
             yield "battery", None if battery is None else with_used_energy(battery)
 
     def _read_gps_position(self) -> LogSeries | None:
-        """Return the GPS positions with a 3-D fix: latitude and longitude (deg) and altitude (m), (n, 3).
+        """Return the GPS positions with a 3-D fix: latitude and longitude (degrees) and altitude (m), (n, 3).
 
         Return None if the receiver never had a fix.
         """
@@ -463,7 +481,7 @@ class VehicleMessages:
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
     def _read_measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return fields of a battery message, only rows in which all were measured; None without rows."""
+        """Return fields of a battery message in those rows in which all were measured; None if there are none."""
         table = self.table(name, columns)
         if table is None:
             return None
@@ -471,7 +489,10 @@ class VehicleMessages:
         return LogSeries(name, table.time[is_measured], table.values[is_measured]) if is_measured.any() else None
 
     def _read_missions(self) -> Iterable[LoggedMission]:
-        """Yield the missions whose items a station uploaded or downloaded."""
+        """Yield the missions that were uploaded or downloaded, in the order of time.
+
+        The last home that the vehicle reported replaces the home of a mission.
+        """
         rows: list[LoggedItem] = []
         total, begins_mission = 0, False
         for time, message in self._items:
@@ -515,7 +536,7 @@ class VehicleMessages:
                 yield replace(mission, mission=mission_with_home)
 
     def mode_numbers(self) -> Iterator[tuple[float, int]]:
-        """Yield the time and the mode number of each heartbeat of the vehicle."""
+        """Yield the time (s) and the autopilot's mode number of each heartbeat of the vehicle."""
         for time, heartbeat in self._named_messages.get("HEARTBEAT", []):
             if _is_vehicle(heartbeat):
                 yield time, int(heartbeat.custom_mode)
@@ -529,6 +550,6 @@ class VehicleMessages:
 
 
 def _decode_text(value: str | bytes) -> str:
-    """Return a text field up to its first zero byte, without surrounding spaces."""
+    """Decode a text field up to its first zero byte, without surrounding spaces."""
     text = value.decode("latin-1") if isinstance(value, bytes) else value
     return text.partition("\0")[0].strip()

@@ -1,4 +1,7 @@
-"""Read the motion of an aircraft from a telemetry log (`.tlog`), as `motion_log` does from ArduPilot's own logs."""
+"""Read the motion of an aircraft from a telemetry log (`.tlog`) of ArduPlane, for an identification.
+
+`logs.importers.motion_log` reads the same from ArduPilot's dataflash logs.
+"""
 
 from pathlib import Path
 
@@ -13,7 +16,7 @@ from world.errors import LogError
 
 # ArduPilot's RAW_IMU states accelerations in thousandths of this, m/s^2, and angular rates in thousandths of a rad/s.
 _STANDARD_GRAVITY_MPS2 = 9.80665
-# Period after which a 32-bit count of microseconds starts at 0 again, s.
+# Time after which a 32-bit number of microseconds starts at 0 again, s.
 _WRAP_S = 2.0**32 * 1e-6
 # The time stated in a message is used if it differs by less than this from its time of reception, s.
 _MAX_CLOCK_DIFFERENCE_S = 2.0
@@ -23,10 +26,10 @@ NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     """Read the motion of an aircraft from a telemetry log of ArduPlane.
 
-    digest: SHA-256 of the file's bytes.
+    Raises LogError for a log without a vehicle or positions, and for a log of PX4, whose telemetry does not state which
+    surface each output moves.
 
-    Raises LogError for a log without a vehicle, and for PX4, because its telemetry does not state which surface each
-    output moves.
+    digest: SHA-256 of the file's bytes.
     """
     messages, damage = read_vehicle_messages(path)
     if messages.is_px4:
@@ -77,19 +80,24 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _select_columns(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
-    """Return columns of a series, sorted by time, multiplied by one factor each; no rows without series."""
+    """Return some columns of a series, sorted by time; no rows if `series` is None.
+
+    columns: indices of the columns.
+    factors: factor for each of these columns; None for 1.
+    """
     if series is None:
         return NO_SAMPLES
     return sort_samples(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
 
 
 def _correct_message_times(time: Floats, microseconds: Floats) -> Floats:
-    """Return the times at which the vehicle made its messages, as stated in the messages, s, (n,).
+    """Return the times that messages state for their data, s, (n,).
+
+    If the stated time of a message and its time of reception differ by `_MAX_CLOCK_DIFFERENCE_S` or more, its time of
+    reception is returned.
 
     time: times of reception on the vehicle's clock, s, (n,).
-    microseconds: times in the messages since the vehicle was switched on, us, (n,); the count may wrap after 32 bits.
-
-    The time of reception is returned where the two times differ by `_MAX_CLOCK_DIFFERENCE_S` or more.
+    microseconds: times stated in the messages since the vehicle was switched on, us, (n,); they may wrap after 32 bits.
 
     >>> _correct_message_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
     [4300.067, 4300.167]

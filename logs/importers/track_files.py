@@ -1,8 +1,8 @@
-"""Read track files (GPX, IGC flight recorders and KML) as flights without attitude or controls.
+"""Read track files (GPX, IGC flight recorder files and KML) as logs with only positions.
 
-GPX is read by gpxpy.  aerofiles 1.5 reads IGC in 3.7 times the time and raises KeyError for a file without a date;
-fastkml 1.4 reads KML in 8 times the time, a track with one damaged coordinate raises TypeError, and one with a damaged
-time pairs all later times with the wrong places.
+GPX is read by gpxpy.  IGC and KML are read in this module.  aerofiles 1.5 reads IGC in 3.7 times the time, and raises
+KeyError for a file without a date.  fastkml 1.4 reads KML in 8 times the time, raises TypeError for a track with one
+damaged coordinate, and after one damaged time pairs all later times with the wrong positions.
 """
 
 import calendar
@@ -31,17 +31,17 @@ from world.wording import count_text
 # ----------------------------------------------------------------------
 # Text of a track file, with checks of its size and of dangerous XML.
 
-# Largest track file; a track of a day at ten points a second takes less.
+# Largest size of a track file, bytes; a track of a day at ten points a second takes less.
 MAX_BYTES = 256 * 2**20
-# A document type can hold entities that grow without bound, or that name other files.
+# Start of an XML document type, which can define entities that grow without bound or that name other files.
 _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 def read_track_text(path: Path, *, xml: bool) -> str:
     """Read the text of a track file; bytes that are not UTF-8 are replaced.
 
-    In a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
-    XML with a document type.
+    Of a zipped file (`.kmz`), the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, a zipped
+    file that cannot be read, and XML with a document type.
 
     xml: True for a file in XML.
     """
@@ -84,7 +84,9 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _find_earliest_time(stamps: NDArray[np.float64]) -> float:
-    """Return the earliest of a track's times, s, ignoring times `MAX_TIME_S` or more from the median.
+    """Return the earliest of a track's times, s.
+
+    Times that are `MAX_TIME_S` or more from the median are ignored.
 
     stamps: times, s, (n,).
     """
@@ -100,7 +102,10 @@ GPX = "GPX track"
 
 
 def read_gpx(path: Path) -> RawLog:
-    """Read a GPX track.  Raises LogError for a track with fewer than two points that have a time."""
+    """Read all tracks of a GPX file as one log, and its routes as missions.
+
+    Raises LogError for a file that is not GPX, and for a file with fewer than two track points with a time.
+    """
     text = read_track_text(path, xml=True)
     try:
         gpx = gpxpy.parse(text)
@@ -144,7 +149,10 @@ def read_gpx(path: Path) -> RawLog:
 
 
 def _make_waypoint_items(points: list[tuple[float, float, float]]) -> tuple[MissionItem, ...]:
-    """Make a waypoint at each point: latitude and longitude, deg, and altitude, m AMSL."""
+    """Make a waypoint item at each point, numbered from 1.
+
+    points: latitude and longitude, degrees, and altitude, m AMSL, of each point.
+    """
     return tuple(
         MissionItem(
             number,
@@ -179,9 +187,10 @@ _DATUMS: dict[str, VerticalDatum] = {"ELL": "ellipsoid", "GEO": "amsl"}
 
 
 def read_igc(path: Path) -> RawLog:
-    """Read the track of an IGC flight recorder.  Raises LogError for a file with fewer than two fixes.
+    """Read the track of an IGC flight recorder file, and the declared task as a mission.
 
-    The altitude is the GNSS altitude if most fixes have one, otherwise the pressure altitude.
+    The altitude is the GNSS altitude if most fixes have one, otherwise the pressure altitude.  Raises LogError for a
+    file with fewer than two fixes.
     """
     lines = re.split(r"\r\n|\n|\r", read_track_text(path, xml=False))
     # A row is the second of the day, latitude and longitude (deg), and pressure and GNSS altitude (m; NaN if missing).
@@ -241,15 +250,21 @@ def read_igc(path: Path) -> RawLog:
 
 
 def _parse_degrees(degrees: str, minutes: str, thousandths: str, side: str) -> float:
-    """Convert degrees, minutes and thousandths of minutes to degrees, negative for the sides S and W."""
+    """Convert texts of degrees, minutes and thousandths of a minute to degrees.
+
+    They are negative for the sides S and W.
+    """
     value = int(degrees) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
     return -value if side in "SW" else value
 
 
 def _make_task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
-    """Return the declared task as a mission, or () if it has fewer than two turn points.
+    """Return the declared task of an IGC file as a mission; () if it has fewer than two turn points.
 
-    If it has more than three points, the first and the last, the take-off and the landing, are left out.
+    Of more than three points, the first and the last are left out: they are the take-off and the landing.
+
+    lines: lines of the file.
+    source: path of the file.
     """
     points = []
     for line in lines:
@@ -277,9 +292,10 @@ KML = "KML track"
 
 
 def read_kml(path: Path) -> RawLog:
-    """Read all tracks of a KML file as one flight.
+    """Read all tracks of a KML file as one log.
 
-    Raises LogError for a file with fewer than two positions with a time.
+    Raises LogError for a file that is not KML, a track whose numbers of times and positions differ, and a file with
+    fewer than two positions with a time.
     """
     try:
         root = ElementTree.fromstring(read_track_text(path, xml=True))
@@ -328,10 +344,10 @@ def _get_local_name(element: ElementTree.Element) -> str:
 
 
 def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Pair the times and positions of a track, as texts; also return how many are left over.
+    """Return the pairs of time and position of a KML track, and the number of unpaired elements.
 
-    Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
-    of times and positions differ in the first case.
+    A track has either all times before all positions, or each time before its position.  In the first case, LogError is
+    raised if the numbers of times and positions differ.
     """
     elements = [
         (_get_local_name(child), child.text or "") for child in track if _get_local_name(child) in ("when", "coord")
@@ -356,11 +372,11 @@ def _pair_times_with_positions(track: ElementTree.Element, path: Path) -> tuple[
 
 
 def _parse_position(when: str, coord: str) -> tuple[float, float, float, float] | None:
-    """Return time since 1970 (s), latitude (deg), longitude (deg) and altitude (m); None if invalid.
+    """Convert a time and a position of a KML track from texts to numbers; None if they are invalid.
 
-    The altitude is NaN if it is missing.
+    Return time (s since 1970), latitude (degrees), longitude (degrees) and altitude (m; NaN if missing).
 
-    when, coord: texts of the time and of the position in a KML track.
+    when, coord: texts of the time and of the position.
     """
     parts = coord.replace(",", " ").split()
     try:

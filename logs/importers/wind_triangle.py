@@ -5,7 +5,7 @@ import numpy as np
 from logs.importers.motion import Samples
 from world.arrays import Floats
 
-# Duration over which the wind is averaged, s; gusts and sideslip of single turns average out.
+# Window over which the wind is averaged, s; gusts and sideslip of single turns average out.
 _WINDOW_S = 60.0
 # Interval of the estimates, s.
 _STEP_S = 1.0
@@ -16,10 +16,10 @@ _MIN_FRACTION = 0.5
 
 
 def estimate_wind(velocity: Samples, attitude: Samples, airspeed: Samples) -> Samples:
-    """Return the wind velocity to north and east, m/s, (k, 2): the ground velocity minus the air velocity.
+    """Estimate the wind velocity to north and east, m/s, (k, 2): ground velocity minus air velocity.
 
-    There is one row for each second, the mean over the `_WINDOW_S` around it, if the aircraft flew in at least half of
-    them.  Fewer than two rows of any input give no wind.
+    There is a row for each second in which the aircraft flew for more than half of the window `_WINDOW_S` around it;
+    its wind is the mean over this window.  There are no rows if any input has fewer than two rows.
 
     The nose is assumed to point into the air flow.  A sideslip or a heading error of 3 degrees at 17 m/s therefore
     appears as 0.9 m/s of wind in straight flight, and averages out on circles.

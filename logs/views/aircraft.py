@@ -16,7 +16,7 @@ from logs.views.drawing import clean_style, new_figure
 
 # Bank angles of the turns, degrees.
 _BANKS_DEG = (15, 20, 30, 40)
-# Winds of the slopes over the ground, m/s.
+# Tailwinds for the slopes over the ground, m/s; negative for headwinds.
 _WINDS = (-10.0, -5.0, 0.0, 5.0, 10.0)
 # Line styles from solid to dotted, in the order of `theme.SHADES` from dark to light.
 _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 1.5)))
@@ -38,9 +38,10 @@ _QUANTITIES = {
 
 
 def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
-    """Draw the envelope of steady flight in four panels.
+    """Draw the steady-flight envelope of an aircraft in four panels.
 
-    The panels show slopes over airspeed, level speeds over altitude, slopes over the ground in wind, and turn radii.
+    The panels show: steepest slopes over airspeed; slowest and fastest level flight over altitude; steepest slopes over
+    the ground in headwind and tailwind; turn radius over ground speed.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from logs.recording.example_log import example_log
@@ -113,11 +114,11 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
     """Draw the trims of level flight, and the modes of motion, in four panels.
 
-    The panels show angle of attack and surfaces over airspeed, throttle and power over airspeed, and the roots of all
-    modes and of the slow modes.
+    The panels show: angle of attack and control surfaces over airspeed; throttle and power over airspeed; the roots of
+    all modes in the complex plane; the roots of the slow modes, enlarged.
 
-    trims: trims in order of airspeed.
-    modes: modes by airspeed, m/s.
+    trims: trims in ascending order of airspeed.
+    modes: modes of motion at each airspeed, keyed by airspeed, m/s.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import level_flight_modes, trim_table
@@ -173,8 +174,8 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
 def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
     """Draw the roots of the modes of motion at each airspeed in the upper half of the complex plane.
 
-    modes: modes by airspeed, m/s.
-    all_modes: True for all modes, False for only the slow ones, whose roots are near the origin.
+    modes: modes of motion at each airspeed, keyed by airspeed, m/s.
+    all_modes: True for all modes, False for only the slow modes, whose roots are near the origin.
     """
     slow_modes = {"phugoid", "spiral", "roll-spiral"}
     labelled_modes: set[str] = set()
@@ -206,9 +207,10 @@ def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: 
 
 
 def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """Draw the step responses of an aircraft: one column of panels for each control.
+    """Draw the step responses of an aircraft: one column of panels for each step.
 
-    A panel shows the change of one quantity from level flight over time (s).
+    Each panel shows over time (s) how much one quantity differs from its value in level flight.  The time during which
+    the control is deflected is shaded.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import step_responses
@@ -232,7 +234,7 @@ def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Fi
                 if row >= len(step.quantities):
                     panel.axis("off")
                     continue
-                # Change of one quantity after the step; the time for which the step is held is shaded.
+                # Change of one quantity after the step; the time for which the step lasts is shaded.
                 name, unit, factor = _QUANTITIES[step.quantities[row]]
                 values = factor * step.change[:, row]
                 panel.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
@@ -264,7 +266,7 @@ def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Fi
 
 
 def _add_legend_above(axes: Any, title: str, columns: int) -> None:
-    """Draw the legend at the top of the panel, and raise the axis limit so that the legend hides no lines."""
+    """Draw the legend at the top of a panel, and extend the vertical axis to make space for it."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
     legend_fraction = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height
@@ -273,13 +275,13 @@ def _add_legend_above(axes: Any, title: str, columns: int) -> None:
 
 
 def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
-    """Shade the speeds that guidance uses, and mark cruise."""
+    """Shade the airspeeds that guidance uses on the horizontal axis, and mark the cruise airspeed."""
     axes.axvspan(aircraft.airspeed_min, aircraft.airspeed_max, color=theme.colour("flown"), alpha=0.05, linewidth=0)
     axes.axvline(aircraft.airspeed, color=theme.colour("quiet"), linewidth=0.8, linestyle=":")
 
 
 def _set_up_axes(axes: Any, title: str, x_label: str, y_label: str) -> None:
-    """Write title and labels of a panel, and draw its grid."""
+    """Set the title and the axis labels of a panel, and draw its grid."""
     axes.set_title(title, fontsize=9.5)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
@@ -288,7 +290,7 @@ def _set_up_axes(axes: Any, title: str, x_label: str, y_label: str) -> None:
 
 
 def _write_title(figure: Figure, title: str, subtitle: str) -> None:
-    """Write title and subtitle of a figure."""
+    """Write the title and the subtitle at the top of a figure."""
     height = figure.get_figheight()
     figure.text(0.06, 1.0 - 0.28 / height, title, fontsize=12, fontweight="bold", va="center")
     figure.text(0.06, 1.0 - 0.55 / height, subtitle, fontsize=8.5, color=theme.colour("quiet"), va="center")

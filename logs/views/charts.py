@@ -1,7 +1,8 @@
 """A chart as plain data: panels of lines, bands, bars and dots with names, units and roles.
 
-Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper, and the script of the page
-with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") whose style is in `logs.theme`.
+Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper; and the script of the HTML
+page with plotly.js, from the data of `chart_json`.  A role is a word for what is drawn ("missile", "planned");
+`logs.theme` gives each role its style.
 """
 
 import math
@@ -22,7 +23,7 @@ LabelRank = Literal["fail", "end", "number", "name"]
 # Number of blocks that a series is thinned to; each block keeps its lowest and highest row.
 BLOCKS = 600
 
-# Names of the layer of waypoints, by the number that is shown at each.
+# Names of the layer of waypoints, by the number that the chart shows at each waypoint.
 NUMBERED_WAYPOINT = "waypoint, numbered"
 NUMBERED_ITEM = "waypoint, with the number of its mission item"
 
@@ -31,18 +32,20 @@ NUMBERED_ITEM = "waypoint, with the number of its mission item"
 class Layer:
     """One graphical layer of a panel.
 
-    kind: "band" is filled from `lower_edge` up to `y`, "area" is the inside of closed outlines, "dashes" are short
-        horizontal strokes, "rings" mark failures.
+    The page is the HTML page; its read-out shows the values at the pointer.
+
+    kind: shape of the layer.  A "band" is filled from `lower_edge` up to `y`; an "area" is the inside of closed
+        outlines; "dashes" are short horizontal strokes; "rings" mark failures.
     name: name in legend and read-out; "" leaves the layer out of both.
     role: meaning of the layer; `logs.theme` assigns its style.
-    x, y: (n,) in the panel's units; NaN separates parts of a line or an outline.
-    lower_edge: (n,) lower edge of a band.
-    dashed: True for the second of two lines of one role.
-    quiet: True for a layer in the legend but not in the read-out of the page.
-    legend: common legend text of several layers; "" for the name.
-    hover_texts: text of the page on each point, or one text on the whole layer; empty to show the values.
-    flight: number of the flight whose track a map draws by this layer; the page takes its points from the flight's
-        moments, which it has anyway.  None for all other layers.
+    x, y: points in the panel's units, (n,) each; NaN separates parts of a line or an outline.
+    lower_edge: lower edge of a band, (n,); None for 0.
+    dashed: True to draw the line dashed, to tell it from another line of the same role.
+    quiet: True for a layer that is in the legend but not in the read-out.
+    legend: legend text shared with other layers; "" for the name.
+    hover_texts: text that the page shows for each point, or one text for the whole layer; empty to show the values.
+    flight: number of the flight whose track this layer of a map draws; the page then takes the points from the moments
+        of that flight, so that they are not stored twice.  None for all other layers.
     """
 
     kind: LayerKind
@@ -60,12 +63,11 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A text at a position of a panel, moved away from other labels.
+    """A text at a position of a panel; it is moved if it would overlap other labels.
 
-    A "name" without free space is omitted.
-
-    rank: "fail" is framed, "end" and "number" are bold; the page writes these two and shows the others on hover.
-    prefer: direction tried first; (0, 0) centers the text on the position.
+    rank: importance and style.  A "fail" is framed; an "end" (start or destination) and a "number" are bold; a "name"
+        is omitted if there is no free space.  The page writes only "end" and "number", and shows the others on hover.
+    prefer: direction in which the text is moved first, as signs of x and y; (0, 0) centers it on the position.
     """
 
     text: str
@@ -81,12 +83,12 @@ class Panel:
     """Layers over one pair of axes.
 
     title, unit: quantity and unit of the vertical axis; unit "" for none.
-    layers: layers from the lowest.
-    limits: label and value of horizontal lines.
-    min_span: smallest range of values shown if `span` is not given.
+    layers: layers in drawing order, the lowest first.
+    limits: label and value of each horizontal limit line.
+    min_span: smallest range of the vertical axis, in its unit, if `span` is not given.
     span: range of the vertical axis, (low, high); None for the range that layers and limits need.
     along: title of the horizontal axis if the panels do not share one, else "".
-    note: note on values that the panel does not show; "" for none.
+    note: text on values that the panel does not show; "" for none.
     labels: labels, the most important first.
     """
 
@@ -102,7 +104,7 @@ class Panel:
 
     @property
     def label(self) -> str:
-        """Title and unit."""
+        """Title followed by the unit in parentheses; only the title if there is no unit."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     def has_values(self) -> bool:
@@ -110,9 +112,10 @@ class Panel:
         return any(np.isfinite(layer.y).any() for layer in self.layers)
 
     def shown_span(self) -> tuple[float, float]:
-        """Return the range of the vertical axis that is drawn, (low, high).
+        """Return the range of the vertical axis, (low, high).
 
-        It is `span`, or else the range of values and limits, at least `min_span` wide, with an 8 % margin.
+        It is `span` if given.  Otherwise it contains all values and limits, is at least `min_span` wide, and has a
+        margin of 8 % on either side.
         """
         if self.span is not None:
             return self.span
@@ -132,16 +135,17 @@ class Chart:
     """Panels one above the other, or side by side.
 
     title: title of a picture; a page has its own headings.
-    along, unit: quantity and unit of a shared horizontal axis.
+    along, unit: quantity and unit of the horizontal axis that the panels share; "" if each panel has its own.
     axis_range: range of that axis; None for the range that the layers need.
     shared: True if the panels share the horizontal axis: they are zoomed and read out together.
-    marks: starts of legs, as value along the axis and text.
+    marks: start of each leg: position on the horizontal axis, and text.
     timed: True if the horizontal axis is the time of flight, so that a click on it can move the aircraft there.
     page_height: height of a panel on a page, pixels.
     print_height: height of a panel in print, inches.
-    widths: widths of panels side by side in print, as fractions of its width; empty for stacked panels.
-    legend: position in print: right of each panel (once above all if the panels share it), or below all.
-    scaled: True if print states the factor by which heights are stretched against distances.
+    widths: width of each panel, as a fraction of the print's width, for panels side by side; empty for stacked panels.
+    legend: position of the legend in print.  "beside" is right of each panel, or above all panels if one legend is
+        enough; "below" is below all panels.
+    scaled: True if print states how many times larger heights are drawn than distances.
     """
 
     title: str
@@ -159,11 +163,14 @@ class Chart:
     scaled: bool = False
 
     def shown_panels(self) -> tuple[Panel, ...]:
-        """Return the panels that have a value, or the first panel if none has any."""
+        """Return the panels with a finite value; only the first panel if no panel has one."""
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
     def shown_axis_range(self) -> tuple[float, float]:
-        """Return `axis_range`, or else the range of the values along the axis; (0, 1) without values."""
+        """Return the range of the horizontal axis: `axis_range`, or else the range of all x values.
+
+        It is (0, 1) without values.
+        """
         if self.axis_range is not None:
             return self.axis_range
         finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]
@@ -172,9 +179,10 @@ class Chart:
 
 
 def series(name: str, role: str, along: Floats, values: ArrayLike, **options: Any) -> Layer:
-    """Make a line layer from a long series, thinned so that its peaks remain.
+    """Make a line layer from a series of any length, thinned so that its peaks remain.
 
-    along, values: position along the axis, and value, of each row, (t,).
+    along: position of each row on the horizontal axis, (t,).
+    values: value of each row, (t,).
     options: other fields of `Layer`.
     """
     column = np.asarray(values, dtype=np.float64)
@@ -183,7 +191,7 @@ def series(name: str, role: str, along: Floats, values: ArrayLike, **options: An
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
-    """Make a layer like `series` does, filled between zero and the values."""
+    """Make a layer like `series`, but a band from zero to the values."""
     column = np.asarray(values, dtype=np.float64)
     rows = find_outline_rows(column, BLOCKS)
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
@@ -208,9 +216,9 @@ def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
 def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats, span: tuple[float, float]) -> Layer:
     """Return a layer that shades the parts of the horizontal axis in which a control is at its limit.
 
-    is_saturated: True at rows where the control is at its limit, (t,).
-    axis_positions: position of each row along the axis, (t,).
-    span: lower and upper edge of the shaded bands.
+    is_saturated: True for each row in which the control is at its limit, (t,).
+    axis_positions: position of each row on the horizontal axis, (t,).
+    span: lower and upper edge of the shading on the vertical axis.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_saturated, [False]]).astype(np.int8)))
     starts, band_ends = axis_positions[edges[::2]], axis_positions[edges[1::2] - 1]
@@ -221,22 +229,24 @@ def make_saturation_band(is_saturated: NDArray[np.bool_], axis_positions: Floats
 
 
 def make_leg_marks(legs: NDArray[Any], axis_positions: Floats) -> tuple[tuple[float, str], ...]:
-    """Return a mark at the start of each leg: its position along an axis, and the leg's name.
+    """Return a mark at the start of each leg: its position on the horizontal axis, and its text.
 
-    legs: leg of each row, by its number in messages, (t,).
-    axis_positions: position of each row along the axis, (t,).
+    The text is "leg" with the number of the leg.
+
+    legs: number of the active leg in each row, as in messages to the user, (t,), t >= 1.
+    axis_positions: position of each row on the horizontal axis, (t,).
     """
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
     return tuple((float(axis_positions[row]), f"leg {legs[row]}") for row in starts)
 
 
 def find_outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Return the rows of the lowest and highest value of each of `count` blocks of a long series.
+    """Select rows of a long series so that a line through them has the same outline as the series.
 
-    A line through these rows has the same outline as the series.  The first and the last row are included.  All rows of
-    a short series are returned.
+    The series is divided into `count` blocks.  Return the indices of the first and the last row and of the lowest and
+    the highest value in each block; all rows if the series has at most 2 * `count`.
 
-    values: (t,); NaN rows are omitted unless a block has no other rows.
+    values: series, (t,); NaN values are skipped, but a block of only NaN keeps its first row, so that the gap shows.
     """
     column = np.asarray(values, dtype=np.float64)
     if column.size <= 2 * count:
@@ -253,7 +263,10 @@ def find_outline_rows(values: ArrayLike, count: int) -> Indices:
 
 
 def nice_step(span: float, max_count: int) -> float:
-    """Return the tick step for at most `max_count` steps in `span`: 1, 2 or 5 times a power of ten."""
+    """Return the smallest round step that divides `span` into at most `max_count` steps.
+
+    A round step is 1, 2 or 5 times a power of ten.
+    """
     min_step = max(span, 1e-9) / max_count
     power = 10.0 ** np.floor(np.log10(min_step))
     for factor in (1.0, 2.0, 5.0, 10.0):
@@ -263,7 +276,7 @@ def nice_step(span: float, max_count: int) -> float:
 
 
 def shorten(text: str, length: int) -> str:
-    """Cut the text with an ellipsis to at most `length` characters.
+    """Cut a text to at most `length` characters, the last of which is then an ellipsis.
 
     >>> shorten("clearance, leg 12", 12)
     'clearance,…'
@@ -271,10 +284,10 @@ def shorten(text: str, length: int) -> str:
     return text if len(text) <= length else text[: length - 1].rstrip() + "…"
 
 
-def numbers(values: Iterable[float], digits: int) -> list[float | None]:
-    """Return numbers for JSON: rounded, with None for non-finite values.
+def json_numbers(values: Iterable[float], digits: int) -> list[float | None]:
+    """Round values to `digits` decimals for JSON, and replace non-finite values by None.
 
-    >>> numbers([1.26, math.nan], 1)
+    >>> json_numbers([1.26, math.nan], 1)
     [1.3, None]
     """
     rounded = np.round(np.asarray(values, dtype=np.float64), digits) + 0.0
@@ -282,7 +295,9 @@ def numbers(values: Iterable[float], digits: int) -> list[float | None]:
 
 
 def screen_decimals(values: Floats) -> int:
-    """Return the number of decimals that drawing on a screen needs: a ten-thousandth of the values' range.
+    """Return the number of decimals that values need on a screen, 0 to 9.
+
+    The last decimal is at most a ten-thousandth of the range of the finite values, or of the value if all are equal.
 
     >>> screen_decimals(np.array([0.0, 90.0])), screen_decimals(np.array([0.001, 0.002]))
     (3, 7)
@@ -321,10 +336,10 @@ def panel_json(panel: Panel) -> Json:
             continue
         document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
         if layer.flight is None:
-            document["x"] = numbers(layer.x, screen_decimals(layer.x))
-            document["y"] = numbers(layer.y, screen_decimals(layer.y))
+            document["x"] = json_numbers(layer.x, screen_decimals(layer.x))
+            document["y"] = json_numbers(layer.y, screen_decimals(layer.y))
         if layer.lower_edge is not None:
-            document["low"] = numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
+            document["low"] = json_numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
         optional_keys: Json = {
             "dashed": layer.dashed,
             "quiet": layer.quiet,
@@ -342,23 +357,26 @@ def panel_json(panel: Panel) -> Json:
         "note": panel.note,
         "limits": [[label, round(value, 4)] for label, value in panel.limits if math.isfinite(value)],
         "layers": layers,
-        "labels": [[label.text, *numbers((label.x, label.y), 3), label.role] for label in labels],
-        "span": numbers(panel.shown_span(), 4),
+        "labels": [[label.text, *json_numbers((label.x, label.y), 3), label.role] for label in labels],
+        "span": json_numbers(panel.shown_span(), 4),
     }
 
 
 @dataclass(frozen=True, slots=True)
 class LegendEntry:
-    """One line of a legend: its text, and its layers, the first of which is drawn as the sample."""
+    """One line of a legend: its text, and the layers with this text.
+
+    The sample is drawn like the first of them.
+    """
 
     text: str
     layers: tuple[Layer, ...] = field(default=())
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Return the legend of panels: an entry for each text of a layer, then one for each label of a limit.
+    """Return the legend entries of panels, first those of layers, then those of limits.
 
-    Layers with the same legend text share an entry; layers without a name or without values have none.
+    Layers with the same legend text share an entry.  Layers without a name or without values have no entry.
     """
     layers_by_name: dict[str, list[Layer]] = {}
     for panel in panels:

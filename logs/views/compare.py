@@ -1,4 +1,4 @@
-"""Chart two flights together: on one map, over the distance flown, and as flown and simulated."""
+"""Chart two flights together, or an imported flight and its simulation."""
 
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,7 @@ _POINTS = 3000
 
 @dataclass(frozen=True, slots=True)
 class NamedFlight:
-    """Flight to draw, and the name of its lines in the legend."""
+    """A flight to draw, with the name that its lines have in the legend."""
 
     name: str
     setup: FlightSetup
@@ -29,7 +29,10 @@ class NamedFlight:
 
 
 def make_two_flights_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
-    """Make the map of two flights: the route of the first, both tracks, and both winds if they differ."""
+    """Make the map of two flights: the route of the first flight, and both tracks.
+
+    It shows both winds if they differ in more than the seed of their gusts, otherwise one.
+    """
     first, _ = flights
     winds = [
         NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
@@ -63,7 +66,7 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
     def make_flight_lines(values: list[Floats]) -> tuple[Layer, ...]:
-        """Make a line for each flight, from its values of one quantity, over the distance flown."""
+        """Make a line for each flight over the distance flown; values: one quantity along each track."""
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
             for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)
@@ -109,9 +112,9 @@ _REFLOWN = (
 
 
 def refly_charts(reflight: Reflight) -> dict[str, Chart]:
-    """Return a chart of each quantity over the distance, as flown and as simulated, by PNG file name.
+    """Chart the quantities of an imported flight and of its simulation over the distance along the legs.
 
-    Quantities that the log lacks have no chart.
+    Return the chart of each quantity, keyed by its PNG file name.  Quantities that the log lacks have no chart.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log

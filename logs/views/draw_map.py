@@ -34,20 +34,20 @@ _MAP_WIDTH = 7.72
 _TOP = 0.5
 # Margin below the map, inches.
 _BOTTOM = 0.55
-# Least height of the legend, inches.
+# Smallest height of the legend, inches.
 _LEGEND = 1.0
 # Left edge of the column right of the map, inches.
 _COLUMN = 8.72
 # Height of a line of the legend, inches.
 _LEGEND_LINE = 0.165
-# Least height of the map, inches.
+# Smallest height of the map, inches.
 _MIN_HEIGHT = 3.6
 # Line spacing of the notes on winds, inches.
 _LINE = 0.145
 
 
 def draw_map(chart: MapChart) -> Figure:
-    """Draw the top view: north up, equal scales, axes in km from the scenario's origin."""
+    """Draw the map of a flight from above: north up, equal scales, axes in km from the scenario's origin."""
     with clean_style():
         handles = [make_legend_handle(entry) for entry in legend_entries([chart.panel])]
         # A legend of four columns.
@@ -68,10 +68,10 @@ def draw_map(chart: MapChart) -> Figure:
 
 
 def make_map_axes(east: tuple[float, float], north: tuple[float, float], legend_height: float) -> tuple[Figure, Any]:
-    """Make the figure and the axes of a map.
+    """Make a figure with the axes of a map, which show km.
 
-    east, north: range of the map, m.
-    legend_height: height of the legend below the map, inches.
+    east, north: range of the map, (min, max) m.
+    legend_height: height left free below the map for the legend, inches.
     """
     height = _MAP_WIDTH * (north[1] - north[0]) / (east[1] - east[0])
     frame_height = max(height, _MIN_HEIGHT)
@@ -89,10 +89,13 @@ def make_map_axes(east: tuple[float, float], north: tuple[float, float], legend_
 
 
 def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: float, top: float) -> list[Any]:
-    """Draw shaded relief with labelled contours and a colour bar, or a note if there is no terrain.
+    """Draw shaded relief with labelled contours and a colour bar within the limits of the axes.
 
-    column: left edge of the column right of the map, inches.  top: margin above the map, inches.
-    Returns the handles for the legend.
+    Without known terrain, write a note instead.  Level ground gets one colour and a note.  Return the legend handle of
+    the contours, [] without contours.
+
+    column: left edge of the column right of the map, for the colour bar and the notes, inches.
+    top: margin above the map, inches.
     """
     note: dict[str, Any] = {"x": column / WIDTH, "y": 0.6, "color": theme.colour("quiet")}
     east_range, north_range = axes.get_xlim(), axes.get_ylim()
@@ -141,10 +144,12 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
 
 
 def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend_height: float = 0.0) -> None:
-    """Draw north and the direction of each wind in the column right of the map.
+    """Draw a compass with an arrow for each wind, and notes on the winds below it.
+
+    They are in the column right of the map.
 
     column: left edge of the column, inches.
-    legend_height: height of the legend below the map, inches; the notes on winds stay above its upper edge.
+    legend_height: height of the legend below the map, inches; the notes stay above its upper edge.
     """
     figure_height = float(figure.get_figheight())
     dial_size = 1.0

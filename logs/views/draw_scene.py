@@ -16,7 +16,7 @@ from flight.simulation.track import Track
 from logs import theme
 from logs.views.charts import Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
 from logs.views.drawing import WIDTH, clean_style, draw_legend, make_legend_handle, new_figure, write_label
-from logs.views.failures import Failures, route_distance, route_samples, stop_rows
+from logs.views.failures import Failures, route_distance, route_samples, stop_start_indices
 from logs.views.labels import LabelPlacer
 from logs.views.scene import GroundGrid, SceneView, exaggeration, ground_grid, scene_bounds, select_drawn_rows
 from world.airspace.zones_on_map import zone_walls
@@ -39,11 +39,11 @@ _MAX_CELLS = 130
 _MAX_TRACK = 1600
 # Smallest ratio of the shorter to the longer side of the drawn ground.
 _MIN_SIDE_RATIO = 0.3
-# Angle by which the viewer moves round a narrower scene, towards its end, rad.
+# Angle by which the viewer moves towards the end of a narrower scene, rad.
 _NARROW_SCENE_AZIMUTH_RAD = math.radians(45.0)
 # With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
-# Largest number of named threats.
+# Largest number of threats with a name in the picture.
 _MAX_NAMES = 30
 
 
@@ -61,7 +61,10 @@ class Projection:
     stretch: float
 
     def project(self, points: Floats) -> Floats:
-        """Return picture coordinates and depth towards the viewer, m: (..., 3) from points (..., 3)."""
+        """Project points (..., 3), m, into the picture.
+
+        Return right, up and depth towards the viewer, m, (..., 3).
+        """
         east, north, up = np.moveaxis(points - self.center, -1, 0)
         cos_azimuth, sin_azimuth = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -sin_azimuth * east + cos_azimuth * north
@@ -75,7 +78,7 @@ class Projection:
 
     @property
     def toward(self) -> Floats:
-        """Vector from any position towards the viewer, to east, north and up, m, (3,).
+        """Vector towards the viewer, the same at every position: east, north and up, (3,), m.
 
         Its horizontal length is 1 m.
         """
@@ -83,10 +86,10 @@ class Projection:
 
 
 def draw_scene(view: SceneView) -> Figure:
-    """Draw the 3-D scene of a flight, seen from the side of the line from start to destination.
+    """Draw the 3-D scene of a flight, viewed at right angles to the line from start to destination.
 
     The title states the factor by which heights are exaggerated.  Lines are dashed and thin behind a ridge.  A long and
-    narrow scene is viewed from nearer to its end and with ground around it, so that it does not appear as a strip.
+    narrow scene is widened and viewed obliquely from its end, so that it does not appear as a strip.
     """
     setup, track, failed = view.setup, view.track, view.failed
     scene_limits = scene_bounds(setup, track)
@@ -128,10 +131,10 @@ def draw_scene(view: SceneView) -> Figure:
 def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
-    """Make a figure with axes of equal scales, whose limits contain route, threats and ground.
+    """Make a figure whose axes have equal scales and contain route, threats and ground.
 
     bounds: range of the scene, (2, 2), m: rows east and north, columns minimum and maximum.
-    grid: ground of the scene; None without terrain.
+    grid: heights of the ground; None without terrain.
     """
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.positions[:, 2].min())
     corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
@@ -173,7 +176,7 @@ def _make_axes(
 def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
     """Draw the cells of the ground from the farthest to the nearest, shaded by light from the north-west.
 
-    Without terrain, draw a level plane.  Return the legend's handles.
+    Without terrain, draw a level plane at mid height.  Return the legend handle of the plane, [] with terrain.
     """
     if grid is None:
         level_altitude = float(projection.center[2])
@@ -224,9 +227,9 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
 
 
 def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
-    """Draw the domes of missiles and radars, the upper halves of their spheres; return legend handles.
+    """Draw the reach of missiles and radars as domes (upper halves of spheres); return the legend handles.
 
-    Spheres that the flight enters have a broad outline.
+    Domes of threats that fail a rule have a broad outline.
     """
     threats = setup.scenario.threats
     handles: list[Any] = []
@@ -256,8 +259,8 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
 def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
     """Draw the walls of the zones, and return their legend handles.
 
-    A wall reaches from the floor of the zone, or the ground, to its ceiling.  Without a ceiling it ends
-    50 m above the path's highest point.
+    A wall reaches from the zone's floor, or else the ground, to the zone's ceiling, or else 50 m above the highest
+    waypoint.
     """
     zones, route = setup.scenario.zones, setup.route.positions
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
@@ -284,7 +287,7 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
 
 
 def _make_legend_handle(kind: LayerKind, role: str, text: str) -> Any:
-    """Return the handle of a legend entry, drawn in the style of a role."""
+    """Return a legend handle for a layer of this kind and role, with a text."""
     empty = np.zeros(0)
     return make_legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 
@@ -298,7 +301,14 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
-    """Draw route (w, 3), waypoints on poles, track and failures; return handles for the legend."""
+    """Draw route, waypoints on poles, track and failures, and keep labels away from the route.
+
+    Return the legend handles.
+
+    route: waypoints, m, (w, 3).
+    track: flown track; None to draw only the plan.
+    placer: places the labels of the picture.
+    """
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
@@ -355,7 +365,7 @@ def _draw_path(
     """Draw a path, thin and dashed where the ground hides it.
 
     points: positions on the path, m, (n, 3).
-    width: line width, points.
+    width: line width, typographic points.
     order: matplotlib's zorder.
     """
     projected = projection.project(points)
@@ -376,22 +386,22 @@ def _draw_path(
 def _draw_labels(
     setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer
 ) -> None:
-    """Label start, destination, waypoints and threats; labels without a free place are left out.
+    """Label start, destination, waypoints and threats; names of threats without a free place are left out.
 
-    If there are too many waypoints, only every n-th and the failed ones are numbered.  Entered threats get the best
-    places.
+    If there are more than `_MAX_NUMBERS` waypoints, only every n-th and the failed ones are numbered.  Threats that
+    fail a rule are labelled before the other threats.
     """
     corners, items = projection.project(route), setup.route.items.tolist()
     last = len(route) - 1
 
     def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
-        """Write a label at a point in picture coordinates, as from `Projection.project`."""
+        """Write a label at a point in the picture, as returned by `Projection.project`."""
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
     # The same words as on the map.
     for k, name in ((0, "start"), (last, "destination")):
         write(name if items[k] == NO_ITEM else f"{items[k]} {name}", corners[k], "end")
-    stop_starts = stop_rows(setup.route.stops.tolist())
+    stop_starts = stop_start_indices(setup.route.stops.tolist())
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
     for k in sorted(k for k in numbered_waypoints - {0, last} if items[k] != NO_ITEM):
@@ -399,7 +409,7 @@ def _draw_labels(
     threats = setup.scenario.threats
     failing_threats = failed.threat_names()
     labels = list(zip(threats.names, projection.project(threats.position), strict=True))
-    # Entered spheres first: they get the best places.
+    # Label failing threats first: they get the best places.
     for k in sorted(range(min(len(labels), _MAX_NAMES)), key=lambda k: k not in failing_threats):
         name, point = labels[k]
         write(

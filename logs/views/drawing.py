@@ -90,7 +90,7 @@ _DIGIT_WIDTH_IN = 0.085
 _LABEL_GAP_IN = 0.06
 # Space on either side of the first and the last waypoint or leg, in legs.
 _PLACE_MARGIN = 0.8
-# Characters of a line of a panel's title beside its axis, if two such lines are enough.
+# Characters in a line of a panel's title left of its axis, if two such lines are enough.
 _PANEL_TITLE_WIDTH = 16
 # Lines of a panel's title that fit left of the tick labels.
 _MAX_PANEL_TITLE_LINES = 2
@@ -98,9 +98,10 @@ _MAX_PANEL_TITLE_LINES = 2
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Use matplotlib's defaults and planfly's settings for pictures instead of the user's matplotlibrc.
+    """Use planfly's picture settings instead of the user's matplotlibrc in a with block.
 
-    The previous settings are restored at the end.
+    Settings that planfly does not state are matplotlib's defaults.  The previous settings are restored at the end of
+    the block.
 
     >>> with clean_style():
     ...     mpl.rcParams["font.size"]
@@ -113,15 +114,15 @@ def clean_style() -> Iterator[None]:
 
 
 class NotebookFigure(Figure):
-    """A figure that a notebook shows without pyplot."""
+    """A figure that a notebook displays although pyplot does not manage it."""
 
     def _repr_png_(self) -> bytes:
-        """Return the picture that a notebook shows."""
+        """Return the figure as the PNG that a notebook displays."""
         return png_bytes(self)
 
 
 def new_figure(height: float) -> Figure:
-    """Make an empty figure of the common width, with its own canvas (no pyplot state).
+    """Make an empty figure of the width `WIDTH`, with its own canvas and without pyplot's global state.
 
     height: height of the figure, inches.
 
@@ -152,9 +153,9 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def jpeg_bytes(png: bytes) -> bytes:
-    """Convert a PNG to a JPEG.
+    """Convert the bytes of a PNG to the bytes of a JPEG.
 
-    For shaded ground, the JPEG takes a quarter of the bytes and a tenth of the time to write.
+    For shaded ground, a JPEG has a quarter of the size of the PNG and takes a tenth of the time to encode.
 
     >>> jpeg_bytes(png_bytes(new_figure(1.0)))[:3].hex()
     'ffd8ff'
@@ -167,7 +168,10 @@ def jpeg_bytes(png: bytes) -> bytes:
 
 
 def svg_bytes(figure: Figure) -> bytes:
-    """Render the figure as an SVG with letters as outlines; the same figure gives the same bytes."""
+    """Render the figure as an SVG without a date, with letters as outlines.
+
+    The same figure gives the same bytes.
+    """
     buffer = io.BytesIO()
     with _use_picture_settings():
         figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
@@ -175,11 +179,11 @@ def svg_bytes(figure: Figure) -> bytes:
 
 
 def page_svg(figure: Figure, description: str) -> str:
-    """Return the figure as an SVG element of a page, in the page's light and dark colours.
+    """Return the figure as an `<svg>` element for an HTML page.
 
-    The colours are those of `theme.css_variables`.
+    Colours are replaced by the variables of `theme.css_variables`, so that they follow the page's light or dark mode.
 
-    description: description for readers who cannot see the figure.
+    description: description for readers who cannot see the figure; it must differ between the figures of a page.
 
     >>> page_svg(new_figure(2.0), "nothing")[:62]
     '<svg role="img" aria-label="nothing" viewBox="0 0 720 144" xml'
@@ -202,14 +206,16 @@ def page_svg(figure: Figure, description: str) -> str:
 
 @contextmanager
 def _use_picture_settings() -> Iterator[None]:
-    """Use the common settings for a picture, without warnings about letters that the font lacks."""
+    """Use planfly's picture settings in a with block, without warnings about letters that the font lacks."""
     with clean_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
         yield
 
 
 def write_png(figure: Figure, path: FilePath) -> None:
-    """Write the figure as a PNG, completely or not at all. Raises OSError.
+    """Write the figure as a PNG file, completely or not at all.
+
+    Raises OSError if the file cannot be written.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -221,9 +227,10 @@ def write_png(figure: Figure, path: FilePath) -> None:
 
 
 def draw_chart(chart: Chart) -> Figure:
-    """Draw a chart of panels; a panel without values is omitted if another panel has values.
+    """Draw the panels of a chart that have values; the first panel if no panel has values.
 
-    Stacked panels get one common legend if each line style has the same meaning in all, and some styles repeat.
+    With the legend beside the panels, they get one common legend above them if `can_share_legend` allows it, otherwise
+    each panel has its own.
     """
     panels = chart.shown_panels() if chart.panels else ()
     has_shared_legend = chart.legend == "beside" and can_share_legend(panels)
@@ -302,9 +309,9 @@ def draw_chart(chart: Chart) -> Figure:
 
 
 def can_share_legend(panels: Sequence[Panel]) -> bool:
-    """Return True if all panels can share one legend.
+    """Return True if one legend is enough for all panels.
 
-    In all panels, each line style must have the same meaning, and each meaning the same style; some styles must repeat.
+    Each style must have one name and each name one style in all panels, and at least one name must occur twice.
 
     >>> from logs.views.charts import Layer
     >>> none = np.zeros(2)
@@ -328,9 +335,9 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool) -> None:
-    """Draw one panel of a chart: range, leg marks, layers, labels and note.
+    """Draw one panel of a chart: axes, leg marks, layers, labels and note.
 
-    has_leg_numbers: True to write the numbers of the legs above the panel.
+    has_leg_numbers: True to write leg numbers above the panel; ignored unless the chart's legend is "beside".
     """
     min_x, max_x = chart.shown_axis_range()
     if chart.shared:
@@ -384,9 +391,10 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
 
 
 def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_numbers: bool) -> None:
-    """Separate the legs by thin lines, and number them above the topmost panel if the numbers fit.
+    """Separate the legs by thin vertical lines, and write their numbers above the panel.
 
-    marks: start of each leg on the x axis, and its text, such as "leg 3".
+    marks: start of each leg on the horizontal axis, and its text, such as "leg 3".
+    has_leg_numbers: False for only the lines.  A number without space next to the number before it is left out.
     """
     for value, _ in marks[1:]:
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
@@ -415,7 +423,9 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
 
 
 def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
-    """Draw the layers of a panel, the lowest first, and its limit lines between bands and other layers.
+    """Draw the layers of a panel in their order, and its limit lines between them.
+
+    The limit lines are above bands and areas, but below other layers.
 
     min_zorder: matplotlib's zorder of the lowest layer.
     """
@@ -483,13 +493,16 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
 
 
 def _make_dash_pattern(role_style: theme.RoleStyle, dashed: bool = False) -> Any:
-    """Return the line style of a role for matplotlib: dashes in line widths, or "-" for a solid line."""
+    """Return matplotlib's line style of a role: a dash pattern, or "-" for a solid line.
+
+    dashed: True for dashes also if the role's line is solid.
+    """
     pattern = role_style.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(role_style.width, 0.1) for part in pattern)) if pattern else "-"
 
 
 def _make_area_style(role_style: theme.RoleStyle) -> dict[str, Any]:
-    """Return matplotlib's style options of a filled area."""
+    """Return matplotlib's options for a filled area in the style of a role."""
     edge = theme.colour(role_style.edge) if role_style.edge else role_style.light
     if not role_style.width and not role_style.hatch:
         edge = "none"
@@ -503,9 +516,9 @@ def _make_area_style(role_style: theme.RoleStyle) -> dict[str, Any]:
 
 
 def _make_dot_style(role_style: theme.RoleStyle, count: int = 1) -> dict[str, Any]:
-    """Return matplotlib's style options of markers; markers of medium size are smaller if there are many.
+    """Return matplotlib's options for markers in the style of a role.
 
-    count: number of markers.
+    count: number of markers; markers of the common size (5.5 points) are smaller if there are more than `_MAX_TICKS`.
     """
     size = 3.0 if count > _MAX_TICKS and role_style.size == 5.5 else role_style.size
     style: dict[str, Any] = {
@@ -521,7 +534,7 @@ def _make_dot_style(role_style: theme.RoleStyle, count: int = 1) -> dict[str, An
 
 
 def _make_ring_style(role_style: theme.RoleStyle) -> dict[str, Any]:
-    """Return matplotlib's style options of hollow circles."""
+    """Return matplotlib's options for hollow circles in the style of a role."""
     return {
         "marker": "o",
         "linestyle": "",
@@ -538,7 +551,10 @@ def _make_ring_style(role_style: theme.RoleStyle) -> dict[str, Any]:
 
 
 def write_labels(axes: Any, panel: Panel) -> None:
-    """Write a panel's labels, the most important first, without overlap with each other or the paths."""
+    """Write a panel's labels, the most important first.
+
+    They overlap neither each other nor the paths if possible.
+    """
     placer = LabelPlacer(axes)
     for layer in panel.layers:
         if layer.kind == "line" and layer.role in ("planned", "flown", "other"):
@@ -548,7 +564,10 @@ def write_labels(axes: Any, panel: Panel) -> None:
 
 
 def write_label(placer: LabelPlacer, label: Label) -> None:
-    """Write one label in the style of its rank; a name may be left out if there is no free place."""
+    """Write one label in the style of its rank at a place that `placer` finds.
+
+    A label of rank "name" is left out if there is no free place.
+    """
     size, gap = theme.LABELS[label.rank]
     options: dict[str, Any] = {"size": size, "gap": gap if label.prefer != (0, 0) else 0.0, "prefer": label.prefer}
     options["color"] = theme.colour(label.role)
@@ -563,7 +582,10 @@ def write_label(placer: LabelPlacer, label: Label) -> None:
 
 
 def make_legend_handle(entry: LegendEntry) -> Any:
-    """Return the legend handle of an entry, a patch, marker or line in the style of its first layer."""
+    """Return matplotlib's legend handle for an entry.
+
+    It is a patch, marker or line in the style of the entry's first layer.
+    """
     layer = entry.layers[0]
     role_style, text = theme.ROLE_STYLES[layer.role], textwrap.fill(entry.text, 36)
     if layer.kind in ("band", "area"):
@@ -579,9 +601,10 @@ def make_legend_handle(entry: LegendEntry) -> Any:
 
 
 def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, columns: int = 4) -> None:
-    """Draw the legend below the picture, where it hides nothing.
+    """Draw the legend of a figure, with its upper left corner at the given position.
 
-    left: distance from the edge of the figure, inches.  top: upper edge as a fraction of the height of the figure.
+    left: distance of the legend from the figure's left edge, inches.
+    top: upper edge of the legend, as a fraction of the figure's height from its lower edge.
     """
     figure.legend(
         handles=handles,
@@ -597,7 +620,7 @@ def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, col
 
 
 def _choose_legend_columns(entries: Sequence[LegendEntry]) -> int:
-    """Return the number of legend columns that fit into a picture, at most four."""
+    """Return the number of legend columns that fit into the width of a picture, 1 to 4."""
     for columns in (4, 3, 2):
         rows = -(-len(entries) // columns)
         column_widths = [

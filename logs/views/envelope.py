@@ -1,4 +1,4 @@
-"""Chart the aircraft's envelope and a flight in it: climb, descent and bank over airspeed."""
+"""Chart a flight in its aircraft's envelope: climb, descent and bank over airspeed."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,11 +18,11 @@ _MAX_DOTS = 2000
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeLine:
-    """Steepest steady path angles at one altitude, over true airspeed.
+    """Steepest climb and descent in steady flight at one altitude, over true airspeed.
 
-    amsl: altitude, m AMSL.
+    amsl: altitude, m above mean sea level.
     airspeed: true airspeeds, m/s, (120,).
-    climb, descent: path angle at each airspeed, degrees, (120,); angles of descents are negative.
+    climb, descent: path angle relative to the air at each airspeed, degrees, (120,); descents are negative.
     """
 
     amsl: int
@@ -32,7 +32,10 @@ class EnvelopeLine:
 
 
 def sample_envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
-    """Return the envelope at the lowest and the highest altitude of the route; once if both are equal."""
+    """Return the envelope at the lowest and at the highest altitude of the route, in that order.
+
+    There is one line if both altitudes round to the same metre.
+    """
     envelope, altitudes = setup.envelope, setup.route.positions[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []
@@ -44,7 +47,7 @@ def sample_envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
 
 @dataclass(frozen=True, slots=True)
 class FlownMoments:
-    """Moments of a flight in the aircraft's envelope, (n,) each.
+    """Airspeed, path angle and bank at n moments of a flight, (n,) each.
 
     airspeed: true airspeed, m/s.
     angle: air-relative path angle, degrees.
@@ -57,7 +60,10 @@ class FlownMoments:
 
 
 def select_flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
-    """Return at most ``count`` moments of a flight, evenly spaced; moments with NaN values are omitted."""
+    """Return at most `count` moments of a flight, evenly spaced in the rows of its track.
+
+    Moments with NaN values are omitted.
+    """
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), count)).astype(np.intp))
     air_velocity = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
     east, north, up = air_velocity.T
@@ -70,10 +76,12 @@ def select_flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
 
 
 def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
-    """Chart the air-relative path angle and the bank over true airspeed, with their limits.
+    """Chart the air-relative path angle and the bank of a flight over true airspeed, with their limits.
 
-    Limits apply at the lowest and highest altitude of the route.  Dots are moments of the flight.  A pull-up or a gust
-    may exceed the limits for a moment, but a leg must not.
+    Limits of the path angle are shown for the lowest and the highest altitude of the route.  Dots are moments of the
+    flight, which may exceed the limits for a short time, in a pull-up or a gust, and planned legs, which must not.
+
+    track: flown track; None to show only the limits and the planned legs.
 
     >>> from logs.recording.example_log import example_log
     >>> [panel.title for panel in envelope_chart(example_log().setup, None).panels]

@@ -1,4 +1,4 @@
-"""Find the places of failures on a route, their names in charts, and the progress of a flight."""
+"""Find where on a route rules failed, how charts name these places, and distances along the route."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,12 +23,12 @@ _MAX_LABELS = 16
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """Rules that failed, by place.
+    """The places at which rules of a verdict failed.
 
-    legs, waypoints: names of the failed rules by the number of the leg or waypoint, as in ``{7: ("slope",)}``; each
-        rule once, in the verdict's order.
-    threats: missiles and radars whose range was entered, each once.
-    places: failing legs and waypoints by kind and number, as in the verdict.
+    legs, waypoints: names of the rules that failed at a leg or waypoint, keyed by its number, as in
+        ``{7: ("slope",)}``; each rule once, in the verdict's order.
+    threats: missiles and radars for which a rule failed, because their range was entered; each once.
+    places: the verdict's description of each failing place, keyed by kind and number.
     """
 
     legs: dict[int, tuple[str, ...]]
@@ -37,11 +37,11 @@ class Failures:
     places: dict[tuple[PlaceKind, int], Place] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        """Return True if anything failed at a place."""
+        """Return True if a rule failed at any leg, waypoint or threat."""
         return bool(self.legs or self.waypoints or self.threats)
 
     def place_name(self, kind: PlaceKind, number: int) -> str:
-        """Return the name of a leg or a waypoint in the verdict.
+        """Return the name of a leg or a waypoint in the verdict; the kind and the number if it did not fail.
 
         >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).place_name("leg", 7)
         'leg 7 (to item 9)'
@@ -51,16 +51,19 @@ class Failures:
         return place_text(self.places.get((kind, number), Place(kind, number)))
 
     def threat_names(self) -> dict[int, str]:
-        """Return the verdict's name of each failing threat, by its index.
+        """Return the verdict's name of each failing threat, keyed by the threat's index.
 
-        A threat that fails as a missile and as a radar is named as a missile.
+        A threat that fails both as a missile and as a radar has the name of the missile.
         """
         radars_first = sorted(self.threats, key=lambda place: place.kind == "missile")
         return {place.index or 0: place_text(place) for place in radars_first}
 
 
-def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
-    """Collect the failures of a verdict by place; places outside the route are ignored."""
+def collect_failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
+    """Collect the failures of a verdict by place; none without a verdict.
+
+    waypoint_count: number of waypoints of the route; failures at higher leg or waypoint numbers are ignored.
+    """
     failed_findings = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
     places = [finding.place for finding in failed_findings if finding.place.index is not None]
     return Failures(
@@ -72,7 +75,11 @@ def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
 
 
 def _collect_failed_rules(failed_findings: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
-    """Return the failed rules of each leg or waypoint below number `count`, keyed by its number."""
+    """Return the names of the rules that failed at each leg or waypoint, keyed by its number.
+
+    kind: kind of place to select, "leg" or "waypoint".
+    count: numbers from `count` on are ignored.
+    """
     rules_by_place: dict[int, list[str]] = {}
     for finding in failed_findings:
         place = finding.place
@@ -84,28 +91,28 @@ def _collect_failed_rules(failed_findings: list[Finding], kind: PlaceKind, count
     return {number: tuple(rules) for number, rules in sorted(rules_by_place.items())}
 
 
-def stop_rows(stops: Sequence[int]) -> list[int]:
-    """Return the index of the first waypoint of each stop of a mission.
+def stop_start_indices(stops: Sequence[int]) -> list[int]:
+    """Return the index of the first waypoint of each stop.
 
-    A stop is a place as numbered in messages; a loiter is one stop with several waypoints.
+    A stop is a place of the mission that has a number in messages; a loiter is one stop with several waypoints.
 
-    stops: number of the stop of each waypoint, in flying order.
+    stops: number of the stop to which each waypoint belongs, in flying order.
 
-    >>> stop_rows([0, 1, 1, 1, 2])
+    >>> stop_start_indices([0, 1, 1, 1, 2])
     [0, 1, 4]
     """
     return [k for k in range(len(stops)) if k == 0 or stops[k] != stops[k - 1]]
 
 
 def route_distance(waypoints: Floats) -> Floats:
-    """Return the horizontal distance of each waypoint along the route, (w,) m."""
+    """Return the horizontal distance along the route at which each waypoint lies, (w,), m."""
     return np.concatenate([[0.0], np.cumsum(leg_runs(waypoints))])
 
 
 def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
-    """Sample a route at its waypoints and at points between them, at most `step` (m) apart.
+    """Sample a route at its waypoints and at even distances, so that samples are at most `step` (m) apart.
 
-    Returns the distance along the route, m, (s,), and the position, m, (s, 3), of each sample.
+    Return the horizontal distance along the route, m, (s,), and the position, m, (s, 3), of each sample.
     """
     waypoint_distances = route_distance(waypoints)
     count = max(2, int(np.ceil(waypoint_distances[-1] / step)) + 1) if waypoint_distances[-1] > 0.0 else 2
@@ -124,7 +131,7 @@ def paths_differ(first_path: Floats, second_path: Floats, tolerance: float) -> b
 
 
 def _compute_max_distance(points: Floats, path: Floats) -> float:
-    """Return the largest distance (m) of points (n, 3) from a path with corners (k, 3)."""
+    """Return the largest distance of any point (n, 3) from a path with corners (k, 3), m."""
     start, step = path[:-1], np.diff(path, axis=0)
     length_square = (step**2).sum(axis=1)
     max_distance = 0.0
@@ -139,10 +146,12 @@ def _compute_max_distance(points: Floats, path: Floats) -> float:
 
 
 def track_distance(waypoints: Floats, track: Track) -> Floats:
-    """Return the distance along the route of each row of a track, (t,) m, never decreasing.
+    """Return how far along the route each row of a track is, m, (t,); the distance never decreases.
 
-    A row is projected onto its active leg, between the ends of the leg.  A row without a position gets the distance of
-    the row before it.
+    A row's position is projected onto the leg that is active in it, and limited to the leg's ends.  A row without a
+    position gets the distance of the row before it.
+
+    waypoints: waypoints of the route, m, (w, 3).
     """
     waypoint_distances = route_distance(waypoints)
     leg = np.clip(track.leg.astype(np.intp), 0, len(waypoints) - 2)
@@ -158,10 +167,12 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 def make_fail_labels(
     failed: Failures, corners: Floats, threat_positions: Mapping[int, tuple[float, float]]
 ) -> tuple[Label, ...]:
-    """Return labels with the names of failing rules, at the first failing legs, threats and waypoints.
+    """Return a label with the names of the failing rules for each failing leg, threat and waypoint.
 
-    corners: (w, 2) drawn positions of the route's waypoints.
-    threat_positions: positions of threats by index; other threats get no label.
+    They are in this order.  There are at most `_MAX_LABELS`; the rest is left out.
+
+    corners: positions of the route's waypoints in the chart, (w, 2).
+    threat_positions: position of threats in the chart, keyed by index; other threats get no label.
     """
     middles = 0.5 * (corners[:-1] + corners[1:])
     labels = [(f"{failed.place_name('leg', k)}: {', '.join(rules)}", *middles[k]) for k, rules in failed.legs.items()]
@@ -176,13 +187,13 @@ def make_fail_labels(
 
 
 def threat_radius(threats: Threats, place: Place) -> float:
-    """Return the radius (m) of the missile or radar sphere of a failing place."""
+    """Return the kill radius of a threat if `place` is a missile, otherwise its detection radius, m."""
     radii = threats.kill_radius if place.kind == "missile" else threats.detection_radius
     return float(radii[place.index or 0])
 
 
 def find_rows_inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Return a mask (t,): True for rows of the track inside the sphere of a threat whose rule fails."""
+    """Return a mask (t,): True for rows of the track within the range of a threat that failed."""
     is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]

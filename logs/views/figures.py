@@ -1,7 +1,7 @@
-"""List the figures of a plan and its flight, for PNG files and for charts and captions of the page.
+"""List the figures of a plan and its flight, for PNG files and for the HTML page.
 
-Each figure has a module of its own that builds its description (`logs.views.profile`, ...); both renderers draw it.
-To add a figure, write its module and one entry here.
+Each figure has a module (`logs.views.profile`, ...) that builds its view: a description as plain data, which
+matplotlib and the page both draw.  To add a figure, write its module and one entry here.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,7 +17,7 @@ from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
-from logs.views.failures import failures
+from logs.views.failures import collect_failures
 from logs.views.glides import glide_chart
 from logs.views.link import DrawnLink, compute_scenario_link, link_chart, link_map
 from logs.views.map import MapChart, flight_map, map_json
@@ -38,11 +38,11 @@ View = Chart | MapChart | SceneView
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """Flight or plan that the figures show.
+    """The flight or plan that the figures show.
 
-    setup: setup with the mission's fence among the zones.
+    setup: setup whose scenario includes the zones of the mission's fence.
     track: track of at least one row; None for a plan that was not flown.
-    returns: judged returns; None if none were judged.
+    returns: judged returns to launch; None if none were judged.
     link: the scenario's radio link; None without a link, or if it cannot be computed.
     """
 
@@ -54,14 +54,14 @@ class Subject:
 
     @property
     def contents_text(self) -> str:
-        """Text that lists what a figure shows: ground, threats and paths."""
+        """List of what a figure from above or from the side shows: ground, number of threats, and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
         track_text = self.text_if_flown(" and the flown track")
         return f"{ground}, {count_text(threats, 'threat')}, the planned path of {count_text(legs, 'leg')}{track_text}."
 
     def text_if_flown(self, flight_text: str, plan_text: str = "") -> str:
-        """Return ``flight_text`` for a flight, and ``plan_text`` for a plan that was not flown."""
+        """Return `flight_text` for a flight, `plan_text` for a plan that was not flown."""
         return flight_text if self.track is not None else plan_text
 
 
@@ -69,12 +69,12 @@ class Subject:
 class FigureEntry:
     """One figure.
 
-    name: name of its section in the page and of its file.
+    name: name of its section in the page, and of its file.
     title: its heading.
-    make_view: function that builds its description; None if there is nothing to draw.
-    alternative: text for readers who cannot see it.
-    caption: explanation of the figure.
-    still: True if the page embeds the figure as a picture too, for readers without scripts.
+    make_view: function that builds its view, or returns None if there is nothing to draw.
+    alternative: function that returns the description for readers who cannot see the figure.
+    caption: function that returns the explanation below the figure.
+    still: True if the page embeds the figure also as a picture, for readers without scripts.
     """
 
     name: str
@@ -86,7 +86,7 @@ class FigureEntry:
 
 
 def _make_path_arguments(subject: Subject) -> dict[str, Any]:
-    """Return keyword arguments for `flight_map` and `profile_chart`: plan, route, track, verdict, stops, items."""
+    """Return the arguments that `flight_map` and `profile_chart` share: paths, verdict, numbering."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -99,11 +99,11 @@ def _make_path_arguments(subject: Subject) -> dict[str, Any]:
 
 
 def _make_flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
-    """Make a function that builds a view of a flight, and returns None for a plan that was not flown."""
+    """Turn `make_chart` into a function of a subject that returns None for a plan that was not flown."""
     return lambda subject: None if subject.track is None else make_chart(subject.setup, subject.track)
 
 
-# Builders of the figures on returns, by name.
+# Function that builds the view of each figure on simulated returns to launch, by the figure's name.
 RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], View | None]] = {
     "returns": returns_map,
     "worst-returns": lambda setup, drawn, _: worst_returns_chart(setup, drawn),
@@ -113,17 +113,25 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 
 
 def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> dict[str, View]:
-    """Build the views of returns, by name of the figure; figures without data are omitted."""
+    """Build the views of simulated returns to launch, keyed by figure name.
+
+    Views without data are omitted.
+
+    track: flown track; None if the returns start on the planned path.
+    """
     setup = with_fence_zones(setup)
     views = ((name, make_view(setup, drawn_returns, track)) for name, make_view in RETURN_FIGURES.items())
     return {name: view for name, view in views if view is not None and drawn_returns.returns.each}
 
 
 def _make_returns_view(name: str) -> Callable[[Subject], View | None]:
-    """Make a function that builds one of the `RETURN_FIGURES`, and returns None if no returns were judged."""
+    """Make a function that builds the view of one of the `RETURN_FIGURES`.
+
+    It returns None if no returns were judged.
+    """
 
     def make_view(subject: Subject) -> View | None:
-        """Return the figure's view, or None if no returns were judged."""
+        """Build the figure's view; None if no returns were judged or there is nothing to draw."""
         if subject.returns is None or not subject.returns.returns.each:
             return None
         return RETURN_FIGURES[name](subject.setup, subject.returns, subject.track)
@@ -132,7 +140,7 @@ def _make_returns_view(name: str) -> Callable[[Subject], View | None]:
 
 
 def _make_link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Callable[[Subject], View | None]:
-    """Make a function that builds a view of the radio link, and returns None without a link."""
+    """Turn `make_view` into a function of a subject that returns None if the subject has no radio link."""
     return lambda subject: None if subject.link is None else make_view(subject.setup, subject.link)
 
 
@@ -142,7 +150,7 @@ def _make_fixed_caption(text: str) -> Callable[[Subject], str]:
 
 
 def _make_sentence(line: str) -> str:
-    """Return a line as a sentence, with a capital letter, a full stop and a space."""
+    """Return a line with a capital first letter, followed by a full stop and a space."""
     return f"{line[:1].upper()}{line[1:]}. "
 
 
@@ -188,7 +196,7 @@ FIGURES = (
         "scene",
         "3-D view",
         lambda subject: SceneView(
-            subject.setup, subject.track, failures(subject.verdict, len(subject.setup.route.points))
+            subject.setup, subject.track, collect_failures(subject.verdict, len(subject.setup.route.points))
         ),
         alternative=lambda subject: f"View from the side: {subject.contents_text}",
         caption=_make_fixed_caption(
@@ -368,9 +376,12 @@ FIGURES = (
 def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """Collect the data that the figures of a flight or a plan show, with its fence and its radio link.
+    """Collect the data that the figures of a flight or a plan show.
 
-    track: track of the flight; a track without rows counts as None, a plan that was not flown.
+    The zones of the mission's fence are added to the setup, and the radio link is computed.
+
+    track: track of the flight; None, or a track without rows, for a plan that was not flown.
+    returns: judged returns to launch; None if none were judged.
     """
     track = track if track is not None and len(track) else None
     setup = with_fence_zones(setup)
@@ -378,7 +389,7 @@ def make_subject(
 
 
 def figure_views(subject: Subject) -> dict[str, View]:
-    """Build the views of all figures of a flight or of a plan, by name; figures without data are omitted.
+    """Build the views of a flight or a plan, keyed by figure name; figures without data are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
@@ -391,9 +402,9 @@ def figure_views(subject: Subject) -> dict[str, View]:
 
 
 def draw(view: View) -> "Figure":
-    """Draw a view with matplotlib.
+    """Draw a view of any type with matplotlib.
 
-    Matplotlib is imported here, because its import takes most of a second.
+    Matplotlib is imported only here, because its import takes most of a second.
     """
     from logs.views.draw_map import draw_map
     from logs.views.draw_scene import draw_scene
@@ -405,21 +416,24 @@ def draw(view: View) -> "Figure":
 
 
 def view_json(view: View) -> dict[str, Any]:
-    """Return a view as JSON data for the page."""
+    """Convert a view of any type to JSON data for the HTML page."""
     if isinstance(view, MapChart):
         return map_json(view)
     return scene_data(view) if isinstance(view, SceneView) else chart_json(view)
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
-    """Draw all figures by name; figures without data are omitted."""
+    """Draw the figures of a flight or a plan, keyed by figure name; figures without data are omitted."""
     return {name: draw(view) for name, view in figure_views(make_subject(setup, track, verdict)).items()}
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
-    """Render figures as PNG, 1500 px wide; return the bytes by file name (`map.png`).
+    """Render views as PNG files, 1500 pixels wide.
 
-    svg: True to render each figure as SVG (`map.svg`), too.
+    Return the bytes of each file, keyed by file name (`map.png`).
+
+    views: views keyed by figure name.
+    svg: True to render each figure as an SVG file (`map.svg`), too.
     """
     from logs.views.drawing import png_bytes, svg_bytes
 

@@ -1,6 +1,6 @@
-"""Chart a front of plans: all plans from above, and the objectives of each over its length.
+"""Chart a front of plans: all plans from above, and the objectives of each plan over its length.
 
-A front is a set of plans of which none is better than another in every objective.
+In a front (Pareto front), no plan is better than another plan in every objective.
 """
 
 import math
@@ -15,15 +15,20 @@ from world.wording import count_text
 
 # One watt hour, J.
 _WATT_HOUR = 3600.0
-# Smallest range of an axis, s, m or Wh; plans that differ less are alike.
+# Smallest range of an axis, s, m or Wh; smaller differences between plans do not matter.
 LEAST_SPAN = 1.0
-# Smallest range of the axis of lengths, as a fraction of the length.
+# Smallest range of the axis of lengths, as a fraction of the shortest length.
 LEAST_LENGTH = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class _NamedPlan:
-    """Plan of a front that is best in one objective: its index in the front, and its name and role."""
+    """A plan of a front that is best in one objective.
+
+    row: index of the plan in the front.
+    name: name after the objective, e.g. "shortest".
+    role: role in `logs.theme` that gives its style.
+    """
 
     row: int
     name: str
@@ -31,10 +36,10 @@ class _NamedPlan:
 
 
 def _find_best_plans(front: Front) -> list[_NamedPlan]:
-    """Return the best plan in each objective.
+    """Return the best plan in each objective, each plan once.
 
     A plan that is best in several objectives is named after the first of them.  An objective in which all plans are
-    equal names no plan, except the first objective, the length.
+    equal is ignored, except the length, which comes first.
     """
     objectives = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
@@ -48,9 +53,9 @@ def _find_best_plans(front: Front) -> list[_NamedPlan]:
 
 
 def front_map(front: Front) -> MapChart:
-    """Return a map of all plans of a non-empty front.
+    """Make a map of all plans of a front of at least one plan.
 
-    The best plan in each objective is numbered and stands out.
+    The best plan in each objective is emphasized and labelled with its number in the front, counted from 1.
     """
     scenario, named_plans = front.plans[0].plan.scenario, _find_best_plans(front)
     named_rows = {plan.row for plan in named_plans}
@@ -79,7 +84,7 @@ def front_map(front: Front) -> MapChart:
 
 
 def front_chart(front: Front) -> Chart:
-    """Chart each plan's exposure, height above ground, energy and time of flight over its length."""
+    """Chart exposure, height above ground, energy and time of each plan of a front over its length, km."""
     named_plans, plans = _find_best_plans(front), front.plans
     lengths = np.array([plan.length for plan in plans]) / 1e3
     other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])

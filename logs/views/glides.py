@@ -1,4 +1,4 @@
-"""Chart flight without an engine: minimum heights to reach home, flat ground, and destinations within reach."""
+"""Map flight without an engine: heights to glide home from, flat ground, and reachable places."""
 
 import numpy as np
 
@@ -12,17 +12,17 @@ from logs.views.charts import Label, Layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.returns import east_and_north, path_layers, split_path_by_reach
 
-# Role and name of the path by destination within reach without an engine.
+# Role and name of a path segment, by the destination within reach without an engine.
 _ROLES_AND_NAMES: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
 
 
 def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart | None:
-    """Map the glide footprint, and the path, coloured by the best destination in gliding reach.
+    """Map the glide footprint, and the path coloured by the best destination within gliding reach.
 
     The footprint consists of the areas from which home or another site can be reached without an engine.  Return None
     if glides were not judged.
 
-    track: the flown track; None for glides from the planned path.
+    track: flown track; None for glides from the planned path.
     """
     glides, scenario, route = drawn_returns.glides, setup.scenario, setup.route.positions
     if not glides.each:
@@ -63,9 +63,12 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
 
 
 def make_footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:
-    """Return layers of the glide footprint; [] if none was computed.
+    """Return the layers of the glide footprint; [] if no footprint was computed.
 
-    There is an area for each height above ground from which a site can be reached, and one of flat ground.
+    There is an area for each band of heights above ground from which a glide reaches a site.  Another area is the flat
+    ground on which a glide can end.
+
+    extent: range of the map, outside which areas are cut off.
     """
     footprint = drawn_returns.glides.footprint
     if footprint is None:
@@ -81,9 +84,9 @@ def make_footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[L
 
 
 def make_area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
-    """Make a layer of areas with holes; NaN separates their rings.
+    """Make one layer of areas with holes; NaN separates their rings.
 
-    parts: rings of each area, (k, 2), m: first its outline, then its holes.
+    parts: rings of each area, m, (k, 2): first its outline, then its holes; at least one area.
     """
     gap = np.full((1, 2), np.nan)
     x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T

@@ -1,4 +1,4 @@
-"""Map the ground risk of a mission: its volumes over the population."""
+"""Map the ground risk of a mission: its ground risk volumes over the population density."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from logs.views.glides import make_area_layer
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
 from world.population import DENSITY_LIMITS_PER_KM2, Population, format_density
 
-# Names of the bands of density, from the lowest.
+# Names of the population density bands, from the lowest density.
 _BAND_NAMES = (
     *(f"below {limit:,.0f} people/km²" for limit in DENSITY_LIMITS_PER_KM2),
     f"from {DENSITY_LIMITS_PER_KM2[-1]:,.0f} people/km²",
@@ -22,11 +22,11 @@ _BAND_NAMES = (
 
 
 class RiskVolume(NamedTuple):
-    """Volume around a mission that an assessment of the ground risk considers.
+    """A volume around a mission that a ground risk assessment considers.
 
     name: name of the volume, such as "flight geography".
-    role: role in `logs.theme`.
-    area: area on the map, m.
+    role: role in `logs.theme` that gives its style.
+    area: area on the map, in m east and north of the origin.
     height: height above ground, m; None for an area on the ground.
     """
 
@@ -37,10 +37,10 @@ class RiskVolume(NamedTuple):
 
 
 def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], population: Population | None) -> MapChart:
-    """Make a map of the volumes of a mission's ground risk over the population.
+    """Make a map of the ground risk volumes of a mission over the population density.
 
     volumes: volumes from the smallest to the largest.
-    population: None to draw no population.
+    population: population around the mission; None to draw none.
     """
     scenario, route = setup.scenario, setup.route.positions
     outline = shapely.get_coordinates(shapely.union_all([volume.area for volume in volumes]))

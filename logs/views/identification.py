@@ -1,4 +1,4 @@
-"""Chart an identification: measured and predicted values of equations, and predictions of a log."""
+"""Chart an identification: measured and predicted values of its equations, and of a log."""
 
 import numpy as np
 
@@ -6,12 +6,14 @@ from aircraft.identification.estimate import Equation
 from aircraft.identification.prediction import QUANTITIES, UNITS, PredictedLog
 from logs.views.charts import Chart, Panel, filled_series, series
 
-# Displayed unit and factor, by unit: degrees in place of radians.
+# Displayed unit, and factor to it, by unit of the equation: degrees instead of radians.
 _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/s2": ("m/s²", 1.0)}
 
 
 def equation_chart(equation: Equation) -> Chart:
-    """Chart measured and predicted values of an equation, and their difference, over all log segments.
+    """Chart measured and predicted values of an equation, and their difference, over time.
+
+    The time is the time of all log segments joined together.
 
     >>> wave = np.sin(np.arange(500) / 20.0)
     >>> chart = equation_chart(Equation("pitch acceleration", "rad/s2", 25.0, wave, 0.9 * wave, 0.99, 0.1))

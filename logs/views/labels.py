@@ -16,11 +16,11 @@ DPI = 150
 
 Box = tuple[float, float, float, float]
 
-# Cost of covering another label: above the cost of any distance and any covered lines.
+# Cost of covering another label; it exceeds the cost of any distance and of any covered lines.
 _OVERLAP_COST = 200.0
-# Cost of standing on the wrong side of a label whose point is near: above the cost of a covered line.
+# Cost of standing on the wrong side of a label whose point is near; it exceeds the cost of a covered line.
 _ORDER_COST = 50.0
-# Distances tried for a framed label beyond its gap, in label heights; a line to its point allows long distances.
+# Distances tried for a framed label in addition to its gap, in label heights; its line to the point allows long ones.
 _FRAMED_DISTANCES = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
 # Distances tried for an unframed label.
 _UNFRAMED_DISTANCES = _FRAMED_DISTANCES[:3]
@@ -34,14 +34,14 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 
 @dataclass(slots=True)
 class LabelPlacer:
-    """Places labels on axes one after another, each where it covers least.
+    """Writes labels on axes one after another, each where it covers least.
 
-    Labels that were placed earlier are not moved.
+    Labels that were written earlier are not moved.
 
     axes: matplotlib's axes, whose limits and position must be final.
     lines: positions that labels should not cover, pixels, (n, 2).
-    boxes: areas of the labels already placed, pixels.
-    points: position that each of these labels names, pixels.
+    boxes: boxes of the labels already written, pixels.
+    points: position to which each of these labels belongs, pixels.
     """
 
     axes: Any
@@ -50,7 +50,11 @@ class LabelPlacer:
     points: list[tuple[float, float]] = field(default_factory=list)
 
     def avoid(self, east: ArrayLike, north: ArrayLike, spacing: float = 6.0) -> None:
-        """Keep later labels off a line through these positions (map units), sampled every `spacing` pixels."""
+        """Keep labels that are placed later off a line through these positions.
+
+        east, north: corners of the line in units of the axes, (n,); positions that are not finite are skipped.
+        spacing: distance between the points of the line that are kept free, pixels.
+        """
         points = self._to_pixels(east, north)
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) < 2:
@@ -73,15 +77,17 @@ class LabelPlacer:
         optional: bool = False,
         **style: Any,
     ) -> None:
-        """Write a text next to data position (x, y), where it overlaps other labels, points and curves least.
+        """Write a text next to a point, where it overlaps other labels and lines least.
 
-        size: font size, points.
-        gap: pixels between text and position.
-        prefer: the direction tried first; (0, 0) centres the text on the position.
+        A framed label, and a label that could not be placed close to its point, gets a line to the point.  Nothing is
+        written if the point is not finite.
+
+        x, y: the point, in units of the axes.
+        size: font size, typographic points.
+        gap: smallest distance between text and point, pixels.
+        prefer: direction tried first, as signs of x and y; (0, 0) centres the text on the point.
         optional: True to omit the label if it would cover another label.
         style: matplotlib's text properties; with `bbox`, the label is framed.
-
-        A framed label, and a label that had to move away, gets a line to its point.
         """
         (point_x, point_y) = self._to_pixels([x], [y])[0]
         if not (math.isfinite(point_x) and math.isfinite(point_y)):
@@ -123,23 +129,29 @@ class LabelPlacer:
             artist.set_path_effects([outline])
 
     def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
-        """Draw a thin line from the centre of a label's box, hidden below the label, to its point.
+        """Draw a thin line from a label to its point.
+
+        It starts at the label's centre and is hidden below the label.
 
         box, x, y: the label's box and its point, pixels.
-        width: line width, points.
+        width: line width, typographic points.
         """
         center = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         line_ends = self.axes.transData.inverted().transform([center, (x, y)])
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
     def _to_pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Convert positions of the map to pixels of the figure, (n, 2)."""
+        """Convert positions in units of the axes, (n,) each, to pixels of the figure, (n, 2)."""
         points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
         return np.asarray(self.axes.transData.transform(points), dtype=np.float64)
 
     @staticmethod
     def _make_box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
-        """Return the box of a label at a distance and in a direction from a point, all in pixels."""
+        """Return the box of a label next to a point (x, y), all in pixels.
+
+        distance: distance between point and label; shorter if the direction is diagonal.
+        direction: side of the point on which the label stands, as signs of x and y.
+        """
         dx, dy = direction
         # A diagonal label approaches the point with its corner, so it may stand closer.
         offset = distance * (0.7 if dx and dy else 1.0)
@@ -153,10 +165,11 @@ class LabelPlacer:
         )
 
     def _compute_order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a label that is on the wrong side of near labels.
+        """Return the cost of a label whose order among labels with near points is wrong.
 
-        If a point is left of another point, but its label right of the other label, a reader could assign both labels
-        to the wrong points.  This is not needed for a framed label, which has a line to its point.
+        It is 0 if the order is right.  If a point is left of another point, but its label right of the other label, a
+        reader could assign both labels to the wrong points.  Framed labels need no such cost, because they have a line
+        to their point.
 
         box: box of the label, pixels.
         x, y: point of the label, pixels.
@@ -173,7 +186,10 @@ class LabelPlacer:
         return cost
 
     def _compute_box_cost(self, box: Box) -> float:
-        """Return the cost of a box: 0 if it is free, more if it leaves the frame or covers labels or lines."""
+        """Return the cost of placing a label in a box.
+
+        It is higher if the box leaves the axes or covers labels or lines.
+        """
         frame = self.axes.get_window_extent()
         cost = 0.0
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:

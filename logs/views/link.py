@@ -1,4 +1,4 @@
-"""Chart a radio link: over time, and on a map of the path and of the coverage by the quality of the link."""
+"""Chart a radio link over time, and map its quality along the path and over the area."""
 
 from dataclasses import dataclass
 from itertools import groupby
@@ -18,14 +18,14 @@ from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, 
 from logs.views.returns import path_layers
 from world.arrays import Floats
 
-# The map calls a link weak if its signal is less than this above the fade margin, dB.
+# The map calls a link weak if its signal exceeds the fade margin by less than this, dB.
 WEAK_MARGIN_DB = 6.0
 LinkQuality = Literal["kept", "weak", "lost", "unknown"]
 # If this fraction of the first Fresnel zone is free of ground, the loss is close to the loss in free space.
 _CLEAR_FRACTION = 0.6
-# Largest clearance, in radii of the first Fresnel zone, that the chart shows: more makes no difference.
+# Largest clearance that the chart shows, in radii of the first Fresnel zone; more makes no difference.
 _MAX_SHOWN_CLEARANCE = 3.0
-# Role and name of the path by the quality of the link; the first is drawn lowest.
+# Role and name of a path segment by the quality of the link there; the first is drawn lowest.
 _ROLES_AND_NAMES: dict[LinkQuality, tuple[str, str]] = {
     "kept": ("return-safe", "link kept"),
     "weak": ("return-low", f"less than {WEAK_MARGIN_DB:.0f} dB above the fade margin"),
@@ -35,7 +35,7 @@ _ROLES_AND_NAMES: dict[LinkQuality, tuple[str, str]] = {
 
 
 def link_quality(margin: float) -> LinkQuality:
-    """Return the quality of a link from its margin above the fade margin, dB.
+    """Classify a link by its margin: how far the signal exceeds the fade margin, dB; NaN if unknown.
 
     >>> link_quality(8.0), link_quality(2.0), link_quality(-1.0), link_quality(float("nan"))
     ('kept', 'weak', 'lost', 'unknown')
@@ -47,11 +47,11 @@ def link_quality(margin: float) -> LinkQuality:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnLink:
-    """Data of the pictures of a radio link.
+    """Data for the pictures of a radio link.
 
     along: the link along the path.
     antenna: position of the station's antenna, m, (3,).
-    coverage: the link at the path's height, over the map.
+    coverage: the link in each cell of the map, for an aircraft at the path's median height.
     extent: range of the map.
     is_flown: True if the path was flown, False for the planned path.
     """
@@ -64,9 +64,9 @@ class DrawnLink:
 
 
 def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
-    """Compute the data for pictures of a radio link that was measured along a path.
+    """Compute the coverage of a radio link around a path, and collect the data for its pictures.
 
-    Return None without a link, a terrain, or a position on the path.
+    Return None if the scenario has no link or no terrain, or the path has no positions.
 
     along: the link along the path.
     antenna: position of the station's antenna, m, (3,).
@@ -81,11 +81,12 @@ def compute_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, i
 
 
 def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
-    """Measure the scenario's radio link along a flight or plan, and compute the data for its pictures.
+    """Compute the scenario's radio link along a flight or plan, and the data for its pictures.
 
-    Return None without a link, a terrain, or a known position of the station.
+    Return None if the scenario has no link or no terrain, the station's position is unknown, or the path has no
+    positions.
 
-    track: None for the planned path.
+    track: flown track; None for the planned path.
     """
     link, terrain = setup.scenario.link, setup.scenario.terrain
     antenna = None if link is None or terrain is None else station_antenna(setup, link, terrain)
@@ -100,17 +101,17 @@ def compute_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink 
 
 
 def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
-    """Chart the link's margin, diffraction loss, Fresnel clearance and distance over time."""
+    """Chart link margin, diffraction loss, Fresnel clearance and distance to the station over time."""
     along, points = drawn.along, drawn.along.points
     name, role = ("flown", "flown") if drawn.is_flown else ("planned path", "planned")
 
     def make_panel(
         title: str, unit: str, values: Floats, limits: tuple[tuple[str, float], ...] = (), note: str = ""
     ) -> Panel:
-        """Return a panel of values over time.
+        """Make a panel of one quantity along the path over time.
 
-        limits: names and values of the limit lines.
-        note: note on values that are not shown.
+        limits: name and value of each limit line.
+        note: text on values that are not shown.
         """
         return Panel(title, unit, (series(name, role, along.time, values),), limits=limits, note=note)
 
@@ -131,7 +132,7 @@ def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
 def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
     """Map a radio link: its quality along the path, the areas of a weak or lost link, and the station.
 
-    The areas apply to the height of the flight.
+    The areas apply to an aircraft at the flight's median height.
     """
     scenario, route, along = setup.scenario, setup.route.positions, drawn.along
     points, antenna = along.points, drawn.antenna
@@ -143,11 +144,11 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         segments.append((quality, [*rows, *range(rows[-1] + 1, min(rows[-1] + 2, len(qualities)))]))
 
     def find_position(k: int) -> tuple[float, float]:
-        """Return east and north of point k, m."""
+        """Return east and north of point k of the path, m."""
         return float(along.positions[k, 0]), float(along.positions[k, 1])
 
     def describe_point(k: int) -> str:
-        """Describe the link margin at point k."""
+        """Return the time and the link margin at point k of the path as text."""
         return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB above the fade margin"
 
     # Areas in which the link is weak, lost or in the ground, at the flight's height.

@@ -1,4 +1,4 @@
-"""Map: terrain, threats, zones, planned path and flown track from above."""
+"""Make maps: terrain, threats, zones, planned path and flown track from above."""
 
 import math
 from collections.abc import Sequence
@@ -9,8 +9,24 @@ import numpy as np
 from flight.mission.itinerary import NO_ITEM
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import NUMBERED_ITEM, NUMBERED_WAYPOINT, Json, Label, Layer, Panel, numbers, panel_json, shorten
-from logs.views.failures import failures, find_rows_inside_threats, make_fail_labels, paths_differ, stop_rows
+from logs.views.charts import (
+    NUMBERED_ITEM,
+    NUMBERED_WAYPOINT,
+    Json,
+    Label,
+    Layer,
+    Panel,
+    json_numbers,
+    panel_json,
+    shorten,
+)
+from logs.views.failures import (
+    collect_failures,
+    find_rows_inside_threats,
+    make_fail_labels,
+    paths_differ,
+    stop_start_indices,
+)
 from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
@@ -18,11 +34,11 @@ from world.scenario import Scenario
 from world.terrain import Terrain
 from world.wind import Wind
 
-# Smallest and largest ratio of height to width; other areas are drawn with ground around them.
+# Smallest and largest ratio of a map's height to its width; a longer or wider area is drawn with ground around it.
 _ASPECTS = (0.4, 1.25)
 # Margin around an area, as a fraction of its longer side.
 _RIM = 0.015
-# The same margin around a mission without an area.
+# Margin around a mission without an area, as a fraction of its longer side.
 _MISSION_RIM = 0.1
 # With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
@@ -37,7 +53,11 @@ Extent = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class NamedWind:
-    """A wind shown at the compass; name: the flight that it belongs to, "" if there is only one wind."""
+    """A wind shown at the compass.
+
+    name: name of the flight in this wind; "" if there is only one wind.
+    role: role in `logs.theme` that gives the arrow's colour.
+    """
 
     wind: Wind
     name: str = ""
@@ -46,9 +66,9 @@ class NamedWind:
 
 @dataclass(frozen=True, slots=True)
 class DrawnTrack:
-    """A flown track, its name and its role.
+    """A flown track to draw, with its legend text and its role.
 
-    flight: index of the flight in the page's data, which contain the flight's moments.
+    flight: index of the flight in the page's list of flights, which contains their moments.
     """
 
     label: str
@@ -59,12 +79,13 @@ class DrawnTrack:
 
 @dataclass(frozen=True, slots=True)
 class MapChart:
-    """Top view with north up and equal scales; lengths in m, labelled in km.
+    """A map with north up and equal scales; lengths are in m, and axes are labelled in km.
 
-    panel: threats, zones, paths and their names, from the lowest; its span is the north range.
-    east: east range shown.
-    origin: origin of the axes, as text.
-    terrain: terrain under all layers; None if none was given.
+    title: title of the map.
+    panel: layers of threats, zones and paths, from the lowest, and their labels.
+    east, north: range shown, (min, max), m.
+    origin: latitude and longitude of the axes' origin, as text.
+    terrain: terrain under all layers; None if there is none.
     winds: winds shown at the compass.
     """
 
@@ -90,16 +111,18 @@ def flight_map(
 ) -> MapChart:
     """Make the map of a plan, or of its flight.
 
-    The waypoints of the route are numbered, and failures of the verdict are marked on it.  A plan that differs from the
-    route by more than 1 m is drawn as a second line.  A missile is drawn as a line around its sphere; the filled circle
-    is the section of the sphere at the altitude of the nearest path point.
+    The waypoints of the route are numbered, and places at which the verdict's rules failed are marked.  A plan that
+    differs from the route by more than 1 m is drawn as a second line.  The outline of a missile is its sphere seen from
+    above; the filled circle is the section of the sphere at the altitude of the nearest point of the path.
 
-    plan_waypoints: waypoints of the plan, m, (p, 3), or None.
-    route_waypoints: waypoints of the flown route, m, (w, 3); None for a plan alone.
-    waypoint_texts: text of the page on each waypoint.
-    stops: number of the stop of each waypoint of the route; None if each waypoint is a stop.
-    items: number of the mission item of each waypoint, which is displayed; `NO_ITEM` displays no number.  None to
-        display the numbers of the stops.
+    plan_waypoints: waypoints of the plan, m, (p, 3); None without a plan.
+    route_waypoints: waypoints of the mission's route, m, (w, 3); None for only a plan.
+    track: flown track; None for a plan that was not flown.
+    verdict: verdict whose failures are marked; None to mark none.
+    waypoint_texts: text that the page shows for each waypoint of the route; empty for none.
+    stops: number of the stop to which each waypoint of the route belongs; None if each waypoint is a stop.
+    items: number of the mission item of each waypoint, which the map shows; no number is shown for `NO_ITEM`.  None to
+        show the numbers of the stops.
     """
     return map_chart(
         scenario,
@@ -128,14 +151,16 @@ def map_chart(
     stops: Sequence[int] | None = None,
     items: Sequence[int] | None = None,
 ) -> MapChart:
-    """Make a map as `flight_map` does, with any number of tracks and winds.
+    """Make a map like `flight_map`, with any number of tracks and winds.
 
     subject: part of the title after the name of the scenario.
+    tracks: flown tracks; tracks without rows are ignored.
+    winds: winds shown at the compass.
     """
     route = route_waypoints if route_waypoints is not None else plan_waypoints
-    failed = failures(verdict, len(route) if route is not None else 0)
+    failed = collect_failures(verdict, len(route) if route is not None else 0)
     stops = range(0 if route is None else len(route)) if stops is None else stops
-    stop_starts = stop_rows(stops)
+    stop_starts = stop_start_indices(stops)
     tracks = [drawn_track for drawn_track in tracks if len(drawn_track.track)]
     failing_threats = failed.threat_names()
     layers: list[Layer] = []
@@ -204,12 +229,14 @@ def scenario_map(
 ) -> MapChart:
     """Make a map of a scenario with additional layers, such as paths.
 
+    subject: part of the title after the name of the scenario.
     layers: additional layers, drawn above area, threats and zones, and below start and destination.
     labels: labels that take precedence over the names of threats and zones.
-    extent: range as from `map_extent`.
-    route: waypoints (w, 3), m, whose ends are start and destination, and whose altitudes determine the filled sections
-        of missiles; None to use the start and destination of the scenario.
-    failing_threats: indices of the threats whose rule fails.
+    extent: range of the map, as returned by `map_extent`.
+    route: waypoints, m, (w, 3).  Its ends are marked as start and destination, and its altitudes determine the filled
+        sections of missiles.  None to mark the start and destination of the scenario.
+    failing_threats: indices of the threats for which a rule failed.
+    winds: winds shown at the compass.
     """
     east, north = extent
     edge_layers = []
@@ -248,22 +275,26 @@ def scenario_map(
 
 
 def map_json(chart: MapChart) -> Json:
-    """Return the map as JSON data, lengths in m; the ground is part of the data of the 3-D view."""
+    """Convert a map to JSON data for the page, lengths in m.
+
+    The ground is not included: the page takes it from the data of the 3-D view.
+    """
     return {
         "origin": chart.origin,
-        "east": numbers(chart.east, 1),
-        "north": numbers(chart.north, 1),
+        "east": json_numbers(chart.east, 1),
+        "north": json_numbers(chart.north, 1),
         **{name: value for name, value in panel_json(chart.panel).items() if name in ("layers", "labels")},
     }
 
 
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
-    """Return the east and north range that shows the scenario's area and all paths, with a margin, m.
+    """Return the range of a map that shows the scenario's area and all paths with a margin, m.
 
-    A mission without a scenario has no area: its range contains the paths, and the parts of zones within the bounds
-    that planfly made around the mission.
+    A mission without a scenario has no area.  Its range contains the paths, and zones as far as they lie within the
+    bounds that planfly chose around the mission.
 
-    paths: paths (t, 3), m; rows with NaN are ignored.
+    route: waypoints, m, (w, 3); None without a route.
+    paths: other paths, m, (t, 3) each; rows with NaN are ignored.
     """
     points = [scenario.start[None, :2], scenario.destination[None, :2]]
     if scenario.external:
@@ -285,7 +316,7 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
 
 
 def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-    """Return start and destination, each as its name and position; the scenario's if there is no route."""
+    """Return the names and positions of start and destination: of the route, or else of the scenario."""
     first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
     return ("start", first), ("destination", last)
 
@@ -293,9 +324,10 @@ def _name_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Flo
 def end_labels(scenario: Scenario, route: Floats | None, numbers_of_waypoints: Sequence[int]) -> list[Label]:
     """Return the labels of start and destination, with the numbers of their waypoints.
 
-    Returns one label if start and destination coincide.
+    They share one label if they are less than 50 m apart.
 
-    numbers_of_waypoints: displayed number of each waypoint of the route; `NO_ITEM` for none.
+    route: waypoints, m, (w, 3); None to label the start and destination of the scenario, without numbers.
+    numbers_of_waypoints: number to show for each waypoint of the route; `NO_ITEM` for none.
     """
     ends = _name_ends(scenario, route)
     numbers_of_ends = (NO_ITEM, NO_ITEM) if route is None else (numbers_of_waypoints[0], numbers_of_waypoints[-1])
@@ -311,7 +343,7 @@ def end_labels(scenario: Scenario, route: Floats | None, numbers_of_waypoints: S
 
 
 def position_text(lat_deg: float, lon_deg: float) -> str:
-    """Return a position as the label of an axis shows it; "" for an unknown position.
+    """Format a position for the label of an axis; "" if its latitude is NaN.
 
     >>> position_text(46.0, -8.5)
     '46.0000°, −8.5000°'

@@ -1,4 +1,7 @@
-"""Draw figures of the paper's experiment: paths of searches, a path of each encoding, convergence."""
+"""Draw figures of the paper's experiment: paths of searches, paths of encodings, convergence.
+
+The paper is Yang, Tang and Lozano 2014.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -49,8 +52,8 @@ _MARKERS = ("o", "s", "^", "D", "v", "P")
 class PaperPath:
     """One path of the experiment.
 
-    waypoints: (w, 3), m.
-    length_ratio: length relative to the straight line from start to destination.
+    waypoints: waypoints of the path, m, (w, 3).
+    length_ratio: path length divided by the length of the straight line from start to destination.
     safe: True if the path is safe at the paper's sample points.
     """
 
@@ -60,10 +63,11 @@ class PaperPath:
 
 
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
-    """Draw the paths of one algorithm over contours, missile and radar circles.
+    """Draw the paths that an algorithm found over contours and threats, as in the paper's Figs. 5-8.
 
-    The legend states the path length ratio (PLR): length relative to the straight line from start to destination.
-    As in Yang, Tang and Lozano 2014, Figs. 5-8.
+    The legend states the path length ratio (PLR): path length divided by the straight line from start to destination.
+
+    paths: path of each search.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -92,9 +96,10 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
 
 
 def draw_encodings(scenario: Scenario, path_by_encoding: Mapping[str, PaperPath], seed: int) -> Figure:
-    """Draw one path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
+    """Draw one path for each encoding on the same map, as in the paper's Figs. 9-12.
 
-    path_by_encoding: the drawn path of each encoding.
+    path_by_encoding: path to draw, keyed by the name of the encoding.
+    seed: seed of the searches, for the title.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -119,9 +124,11 @@ def draw_encodings(scenario: Scenario, path_by_encoding: Mapping[str, PaperPath]
 
 
 def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: float) -> tuple[Figure, Any, list[Any]]:
-    """Draw ground and threats; return figure, axes and their legend handles.
+    """Make a map with ground and threats.
 
-    legend_height: height of the legend, inches.
+    Return the figure, its axes, and the legend handles of ground and threats.
+
+    legend_height: height left free below the map for the legend, inches.
     """
     min_corner, max_corner = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((max_corner - min_corner).max())
@@ -137,7 +144,10 @@ def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: floa
 
 
 def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
-    """Draw start and destination, with labels clear of the paths; return their handles for the legend."""
+    """Draw start and destination with labels that avoid the paths; return their legend handles.
+
+    paths: waypoints of each path, m, (w, 3).
+    """
     placer = LabelPlacer(axes)
     for path in paths:
         placer.avoid(path[:, 0], path[:, 1])
@@ -152,10 +162,14 @@ def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[A
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
-    """Draw the number of searches with a safe path, and the length ratios of safe paths, over generations.
+    """Draw the number of searches with a safe path, and the length ratios of these paths.
 
-    histories: ``histories[30]["umda"]`` has one array (g, 3) for each search with umda among 30 threats; its rows are
-        generations, its columns length ratio, kill exposure and violations of the best path so far.
+    Both are drawn over the generations.  There is a column of panels for each number of threats, and a line for each
+    algorithm.
+
+    histories: histories of searches, keyed by number of threats and by algorithm: ``histories[30]["umda"]`` has one
+        array (g, 3) for each search.  Its rows are generations; its columns are length ratio, kill exposure and
+        violations of the best path so far.
 
     >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
     >>> figure = draw_convergence({30: {"umda": [history]}})
@@ -208,9 +222,12 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
 def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], style: Mapping[str, Any]) -> None:
     """Draw how many searches of one algorithm have a safe path, and the length ratios of these paths.
 
-    A search that ended early keeps its last value.
+    A search that ended early keeps its last values.  The length ratios are drawn as their median, and as a band from
+    the smallest to the largest.
 
-    upper, lower: axes of the number and of the length ratios, over generations.
+    upper, lower: axes for the number of searches and for the length ratios.
+    histories: histories as in `draw_convergence`.
+    style: matplotlib's line style of the algorithm.
     """
     length = max(len(history) for history in histories)
     padded_histories = np.stack(

@@ -1,4 +1,4 @@
-"""Chart a blind prediction: the band of each quantity, and the flight."""
+"""Chart a blind prediction: the predicted 95 % band of each quantity, and the flown values."""
 
 from collections.abc import Sequence
 
@@ -9,15 +9,17 @@ from logs.views.charts import Chart, Label, Layer, Panel
 
 # Largest step along the axis within one window, as a multiple of the median step.
 _MAX_STEP_RATIO = 5.0
-# Position of the centre of a label along the axis, as a fraction of its length; it keeps the text off the axis on a
-# telephone.
+# Position of the centre of a label along the axis, as a fraction of the axis; far enough that the text does not cover
+# the vertical axis on the small screen of a telephone.
 _LABEL_FRACTION = 0.12
 
 
 def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Chart:
-    """Chart the predicted band of each quantity and the flown values, a panel for each quantity.
+    """Chart the predicted band and the flown values of each quantity, in a panel for each quantity.
 
-    by_time: True for bands over the time of the log, s, False for bands over the distance along the legs, m.
+    Quantities that were not measured in the flight have no panel.
+
+    by_time: True if the bands are over the time of the log, s; False if over the distance along the legs, m.
 
     >>> time = np.arange(4.0)
     >>> chart = band_chart([Band("bank", "deg", time, time - 1.0, time + 1.0, time)], "a flight")

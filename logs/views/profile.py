@@ -1,4 +1,4 @@
-"""Profile: terrain, plan, flight and threats in the vertical plane along the path."""
+"""Chart the profile of a flight: terrain, plan, track and threats in the plane along the path."""
 
 from collections.abc import Sequence
 
@@ -10,12 +10,12 @@ from logs.verdict.verdict import Verdict
 from logs.views.charts import NUMBERED_ITEM, NUMBERED_WAYPOINT, Chart, Label, Layer, Panel, find_outline_rows, shorten
 from logs.views.failures import (
     Failures,
-    failures,
+    collect_failures,
     find_rows_inside_threats,
     make_fail_labels,
     route_distance,
     route_samples,
-    stop_rows,
+    stop_start_indices,
     track_distance,
 )
 from logs.views.threats_and_zones import PathPlane, entered_cuts, threat_cuts, zone_bands
@@ -24,7 +24,7 @@ from world.scenario import Scenario
 
 # Number of samples along the path.
 _SAMPLES = 1200
-# Number of blocks that the flight is thinned to.
+# Number of blocks to which the flown track is thinned, see `find_outline_rows`.
 _BLOCKS = 800
 # Smallest range of altitudes shown, m.
 _MIN_SPAN = 50.0
@@ -47,14 +47,14 @@ def profile_chart(
 ) -> Chart:
     """Chart altitudes (m AMSL) over the distance along the route (km).
 
-    The route is route_waypoints (w, 3), or plan_waypoints if that is None; without either, the straight line from start
-    to destination.  Ground, spheres and zones are cut by the vertical plane along the route.  Flown altitudes are drawn
-    at the progress of the flight along the route, which never decreases.
+    Ground, threats and zones are cut by the vertical plane along the route.  Without a route, this is the plan, or else
+    the straight line from start to destination.  Flown altitudes are drawn at the flight's progress along the route.
 
-    stops: number of each waypoint, (w,), shown at the first of those with the same number; None numbers all waypoints.
-    items: number of the mission item of each waypoint, shown in place of its stop; see `logs.views.map.flight_map`.
-    above_ground: height above ground at the end of each leg, m, (w,), as in `flight.mission.route.Route`; None if no
-        leg follows the terrain.
+    plan_waypoints, route_waypoints: waypoints of the plan and of the mission's route, m, (p, 3) and (w, 3), or None.
+    track, verdict, items: as in `logs.views.map.flight_map`.
+    stops: number of the stop of each waypoint, shown at the stop's first waypoint; None if each waypoint is a stop.
+    above_ground: height above ground at the end of each leg, m, (w,), NaN for legs that do not follow the terrain; None
+        if no leg follows it.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -78,9 +78,9 @@ def profile_chart(
         )
     altitude_span = _choose_altitude_limits(scenario, route, track, ground)
     plane = PathPlane(distance / 1000.0, points, ground, *altitude_span)
-    failed = failures(verdict, len(route))
+    failed = collect_failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
-    stop_starts = stop_rows(stops)
+    stop_starts = stop_start_indices(stops)
     zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown_layers, entered_positions = _make_flown_layers(scenario, route, track, failed, plane)
@@ -118,10 +118,11 @@ def profile_chart(
 def _make_chart(
     scenario: Scenario, waypoint_distances: Floats, stop_starts: list[int], panel: Panel, *, is_straight: bool
 ) -> Chart:
-    """Make the chart of the profile from its panel.
+    """Make the chart of the profile from its panel, with a mark at the start of each leg.
 
-    waypoint_distances: distance of each waypoint along the route, m.
-    stop_starts: index of the first waypoint of each stop, as from `stop_rows`.
+    waypoint_distances: distance of each waypoint along the route, m, (w,).
+    stop_starts: index of the first waypoint of each stop, as returned by `stop_start_indices`.
+    is_straight: True if there is no route, only the straight line from start to destination.
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
@@ -151,13 +152,16 @@ def _compute_planned_altitudes(
     ground: Floats,
     scenario: Scenario,
 ) -> Floats:
-    """Return the planned altitude at each route sample, m AMSL, (s,), also on terrain-following legs.
+    """Return the planned altitude at each sample of the route, m AMSL, (s,).
 
-    On such a leg the height above ground changes linearly from its start to its end; other legs are straight.
+    On a leg that follows the terrain, the height above ground changes linearly from start to end.  Other legs, and
+    samples over unknown ground, have the altitude of the straight line between the waypoints.
 
-    waypoint_distances: distance of each waypoint along the route, m.
-    height_above_ground: height above ground at the end of each leg, m, (w,); NaN if it does not follow the terrain.
-    distance, line_altitude, ground: distance, straight-line altitude and ground altitude of each sample, m, (s,).
+    waypoint_distances: distance of each waypoint along the route, m, (w,).
+    route: waypoints, m, (w, 3).
+    height_above_ground: height above ground at the end of each leg, m, (w,); NaN for legs that ignore the terrain.
+    distance, line_altitude, ground: distance along the route, straight-line altitude and ground altitude of each
+        sample, m, (s,).
     """
     ground_altitudes = terrain_altitudes(scenario, route)
     waypoint_heights = route[:, 2] - (0.0 if ground_altitudes is None else ground_altitudes)
@@ -170,7 +174,10 @@ def _compute_planned_altitudes(
 
 
 def terrain_altitudes(scenario: Scenario, points: Floats) -> Floats | None:
-    """Return the terrain elevation (s,) under the points, or None if unknown at all of them."""
+    """Return the terrain elevation under points (s, 3), m AMSL, (s,).
+
+    Return None if it is unknown at all of them.
+    """
     if scenario.terrain is None:
         return None
     heights = scenario.terrain.height(points[:, 0], points[:, 1])
@@ -180,9 +187,13 @@ def terrain_altitudes(scenario: Scenario, points: Floats) -> Floats | None:
 def _choose_altitude_limits(
     scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None
 ) -> tuple[float, float]:
-    """Return the limits of the altitude axis, m AMSL, which contain ground, plan and flight.
+    """Return the range of the altitude axis, (low, high) m AMSL, which contains ground, plan and flight.
 
-    Height limit and ceiling are included unless they would compress the rest too much.
+    The maximum height above ground is included up to its value above the highest waypoint.  The ceiling is included if
+    it is not far above the rest.
+
+    route: waypoints, m, (w, 3).
+    ground: ground altitude of each sample of the route, m AMSL, (s,); None without terrain.
     """
     heights = [route[:, 2]] + ([] if track is None else [track.position[:, 2]])
     if ground is not None:
@@ -201,7 +212,7 @@ def _choose_altitude_limits(
 
 
 def make_ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
-    """Return layers of the ground, of the required clearance above it, and of the height limit.
+    """Return layers of terrain, required clearance above it, and maximum height above ground.
 
     A limit that the scenario does not set has no layer.  Return [] without terrain.
     """
@@ -226,12 +237,13 @@ def make_ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
 def _make_flown_layers(
     scenario: Scenario, route: Floats, track: Track | None, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return layers of flown altitudes and entered threats, and label positions of these threats.
+    """Return layers of the flown altitudes and of threats that failed, and label positions.
 
-    For a plan that was not flown (`track` is None), there are only the threats that the plan enters.
+    The label positions are keyed by the index of the threat.
 
     route: waypoints, m, (w, 3).
-    plane: vertical plane along the planned path, in which the threats are cut.
+    track: flown track; None for a plan, of which only the threats that failed are drawn.
+    plane: vertical plane along the planned path; threats that failed in a flight are cut along its track instead.
     """
     if track is None:
         return entered_cuts(scenario.threats, failed, plane)
@@ -255,11 +267,15 @@ def _make_flown_layers(
 def _make_waypoint_labels(
     waypoint_distances: Floats, route: Floats, stops: Sequence[int], numbers: Sequence[int], failed: Failures
 ) -> list[Label]:
-    """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
+    """Return labels with the numbers of at most about `_MAX_NUMBERS` waypoints.
 
-    numbers: displayed number of each waypoint; `NO_ITEM` for none.
+    All waypoints that fail a rule are labelled, too.
+
+    waypoint_distances: distance of each waypoint along the route, m, (w,).
+    stops: number of the stop to which each waypoint belongs, (w,).
+    numbers: number to show for each waypoint, (w,); `NO_ITEM` for none.
     """
-    stop_starts = stop_rows(stops)
+    stop_starts = stop_start_indices(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0 or n == len(stop_starts) - 1} | set(
         failed.waypoints

@@ -6,13 +6,13 @@ from world.arrays import Floats
 
 
 def relief(heights: Floats, spacing: float, span: float) -> Floats:
-    """Return the brightness of shaded relief, (rows, columns): 0.55 in shade to 1.0 in light.
+    """Return the brightness of ground lit from the north-west: 0.55 in shade to 1.0 in light.
 
-    The light comes from the north-west.  Where heights are unknown (NaN), the ground is taken as level.
+    The result is (rows, columns).  Unknown heights (NaN) are replaced by the mean height.
 
-    heights: (rows, columns) m, rows from south to north.
-    spacing: distance between rows, m.
-    span: difference between lowest and highest height, m.
+    heights: heights on a grid, m, (rows, columns); rows from south to north, columns from west to east.
+    spacing: distance between rows, and between columns, m.
+    span: difference between the lowest and the highest height, m.
 
     >>> slope = np.arange(3.0)[None, :] * np.ones((3, 1))
     >>> bool(relief(-slope, 1.0, 2.0).mean() < relief(slope, 1.0, 2.0).mean())  # falls to the east, then rises

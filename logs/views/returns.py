@@ -1,4 +1,7 @@
-"""Chart returns to launch: path by outcome, profiles of the worst returns, and minimum start heights."""
+"""Chart simulated returns to launch: outcome along the path, worst returns, lowest safe altitudes.
+
+A return, here, is a simulated return to launch that starts at a point of the flown or planned path.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -18,13 +21,13 @@ from logs.views.profile import make_ground_bands, terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
 from world.arrays import Floats
 
-# Role and name of the path by outcome of the returns; the safe outcome is drawn lowest.
+# Role and name of a path segment by the outcome of returns from there; the safe outcome is drawn lowest.
 _ROLES_AND_NAMES: dict[Kind, tuple[str, str]] = {
     kind: (f"return-{kind}", segment_text(kind)) for kind in reversed(KINDS)
 }
 # Smallest range of altitudes that a profile shows, m.
 _MIN_SPAN = 100.0
-# Number of points of a path, and of ground samples under it.
+# Number of drawn points of a path, and of ground samples under it.
 _PATH_POINTS = 1200
 # Smallest interval of the points of a planned path, s.
 _MIN_STEP_S = 0.2
@@ -34,10 +37,11 @@ Element = TypeVar("Element")
 
 
 class PathPoint(NamedTuple, Generic[Element]):
-    """Point of the flown or planned path, with the nearest element that was judged, such as a return.
+    """A point of the flown or planned path, with the judged element that is nearest in time.
 
-    time: s.
-    position: m, (3,).
+    time: flight time, s.
+    position: east, north and altitude, m, (3,).
+    element: judged element, such as a return or a glide.
     """
 
     time: float
@@ -52,21 +56,21 @@ def split_judged_path(
     time_of: Callable[[Element], float],
     key_of: Callable[[Element], Key],
 ) -> list[tuple[Key, list[PathPoint[Element]]]]:
-    """Split the path into segments by what was judged there, such as the outcome of a return.
+    """Split the path into segments with the same judgment, such as the same outcome of a return.
 
     Each point of the path gets the judged element that is nearest in time; a segment ends where the key of the element
-    changes.  Returns the key and the points of each segment, in order of time; [] without elements.  Each segment but
-    the last also has the first point of the next segment.
+    changes.  Return the key and the points of each segment, in order of time; [] without elements.  Each segment except
+    the last also has the first point of the next segment, so that there are no gaps.
 
-    track: the flown track; None for the planned path.
-    elements: judged elements, such as returns, in order of time; each time has one element.
-    time_of: function that returns the time of an element, s.
-    key_of: function that returns the key of an element, such as its outcome.
+    track: flown track; None for the planned path.
+    elements: judged elements, such as returns, in order of time, at most one at a time.
+    time_of: function that returns the flight time of an element, s.
+    key_of: function that returns the key of an element, such as the outcome of a return.
     """
     if not elements:
         return []
     times = np.array([time_of(element) for element in elements])
-    # The first and the last element stand for the path beyond them, too, as far as the others do.
+    # The first and the last element also apply to half an interval of the path before and after them.
     margin = 0.5 * float(np.diff(times).max(initial=0.0))
     first, last = float(times[0]) - margin, float(times[-1]) + margin
     if track is None:
@@ -89,12 +93,14 @@ def path_layers(
     position_of: Callable[[Element], tuple[float, float]],
     text_of: Callable[[Element], str],
 ) -> list[Layer]:
-    """Return line layers of a path whose segments are coloured by key, one layer for each role and name.
+    """Return line layers of a path whose segments are coloured by their key.
 
-    segments: key and elements of each segment of the path.
-    roles_and_names: role and name of each key, in the order of the layers.
-    position_of: function that returns the coordinates of an element on the chart.
-    text_of: function that returns the hover text of an element.
+    There is one layer for each role and name.
+
+    segments: key and points of each segment of the path.
+    roles_and_names: role and legend text of each key, in the order of the layers.
+    position_of: function that returns the coordinates of a point on the chart, (x, y).
+    text_of: function that returns the hover text of a point.
     """
     layers = []
     for role, name in dict.fromkeys(roles_and_names.values()):
@@ -108,15 +114,15 @@ def path_layers(
 
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart:
-    """Return a map of the path, coloured by the outcome of returns from it, and of the worst returns.
+    """Make a map of the path, coloured by the outcome of returns from it, and of the worst returns.
 
-    track: the flown track; None for returns from the planned path.
+    track: flown track; None if the returns start on the planned path.
     """
     scenario, route = setup.scenario, setup.route.positions
     limit = drawn_returns.returns.limit
 
     def describe_return(ret: SimulatedReturn) -> str:
-        """Return the hover text of a return: start, target and outcome."""
+        """Return the hover text of a return: start time, target and outcome."""
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
     segments = split_path_by_outcome(setup, drawn_returns, track)
@@ -164,14 +170,19 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | 
 
 
 def east_and_north(point: PathPoint[Any]) -> tuple[float, float]:
-    """Return the coordinates of a point of the path on a map, m."""
+    """Return east and north of a point of the path, m."""
     return float(point.position[0]), float(point.position[1])
 
 
 def split_path_by_outcome(
     setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
 ) -> list[tuple[Kind, list[PathPoint[SimulatedReturn]]]]:
-    """Split the path into segments by the outcome of the nearest return."""
+    """Split the path into segments by the outcome of the return that starts nearest in time.
+
+    Return the outcome and the points of each segment, see `split_judged_path`.
+
+    track: flown track; ignored if the returns start on the planned path.
+    """
     flown_track = track if drawn_returns.returns.flown else None
     return split_judged_path(
         setup, flown_track, drawn_returns.worst_by_start, lambda ret: ret.time, lambda ret: ret.kind
@@ -181,7 +192,12 @@ def split_path_by_outcome(
 def split_path_by_reach(
     setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
 ) -> list[tuple[Reach, list[PathPoint[Glide]]]]:
-    """Split the path into segments by the best destination of the nearest glide."""
+    """Split the path into segments by the best destination of the glide that starts nearest in time.
+
+    Return the destination and the points of each segment, see `split_judged_path`.
+
+    track: flown track; ignored if the glides start on the planned path.
+    """
     flown_track = track if drawn_returns.returns.flown else None
     glides = drawn_returns.glides.each
     return split_judged_path(setup, flown_track, glides, lambda glide: glide.time, lambda glide: glide.reach)
@@ -192,14 +208,14 @@ def split_path_by_reach(
 
 
 def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Chart | None:
-    """Chart the altitudes along the worst returns over the ground, a panel for each return.
+    """Chart altitude and ground along each of the worst returns, in a panel for each return.
 
-    Return None without returns.
+    Return None if there are no worst returns.
     """
     if not drawn_returns.worst:
         return None
     scenario = setup.scenario
-    # All panels show the same range of altitudes, which contains each path and the ground under it with a margin, m.
+    # All panels show the same range of altitudes, which contains all paths and the ground under them, with a margin, m.
     spans = []
     for worst in drawn_returns.worst:
         ground = terrain_altitudes(scenario, worst.path)
@@ -243,9 +259,11 @@ def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Char
 
 
 def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> Chart | None:
-    """Chart over time the flown altitude, the lowest safe altitude for a return, and the glide margins.
+    """Chart altitude, lowest safe altitude for a return, and altitude to spare of glides over time.
 
-    The flown altitude is coloured by the outcome of a return.  Return None if no returns were judged.
+    The path's altitude is coloured by the outcome of a return from there.  Return None if no returns were judged.
+
+    track: flown track; None if the returns start on the planned path.
     """
     if not drawn_returns.returns.each:
         return None

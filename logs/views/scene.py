@@ -1,4 +1,4 @@
-"""Build the data of the 3-D scene: ground, threats, zones and plan, as JSON data for the page."""
+"""Build the 3-D scene as JSON data for the page: ground, threats, zones and plan."""
 
 import base64
 import json
@@ -9,22 +9,24 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.views.failures import Failures, stop_rows
+from logs.views.failures import Failures, stop_start_indices
 from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
 
-# Largest number of vertices along a side of the ground: indices of the mesh stay below 65,536.
+# Largest number of vertices along a side of the ground, so that indices of the mesh stay below 65,536.
 MAX_GROUND = 250
-# Value of an unknown height.
+# 16-bit value of an unknown height.
 MISSING = 65535
 
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """Data of the 3-D picture and the 3-D view of the page.
+    """Data for the 3-D picture and for the 3-D view of the page.
 
-    setup: setup with the mission's fence among the zones.  track: None for a plan that was not flown.
+    setup: setup whose scenario includes the zones of the mission's fence.
+    track: flown track; None for a plan that was not flown.
+    failed: places at which rules failed.
     """
 
     setup: FlightSetup
@@ -34,7 +36,11 @@ class SceneView:
 
 @dataclass(frozen=True, slots=True)
 class GroundGrid:
-    """Heights (n, e) m AMSL at the crossings of ``north`` (n,) and ``east`` (e,) m; NaN where unknown."""
+    """Altitudes of the ground on a grid.
+
+    east, north: coordinates of the columns and of the rows, m, (e,) and (n,).
+    heights: altitude at each grid point, m AMSL, (n, e); NaN where unknown.
+    """
 
     east: Floats
     north: Floats
@@ -42,7 +48,7 @@ class GroundGrid:
 
 
 def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
-    """Return the range of area, route and flight, m, (2, 2).
+    """Return the horizontal range that contains the scenario's area, the route and the flight, m, (2, 2).
 
     The rows are east and north, the columns minimum and maximum.
     """
@@ -54,9 +60,12 @@ def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
 
 
 def ground_grid(terrain: Terrain | None, bounds: Floats, max_samples: int) -> GroundGrid | None:
-    """Sample the ground in nearly square cells, with up to ``max_samples`` samples a side.
+    """Sample the altitude of the ground on a grid of nearly square cells.
 
-    Return None without terrain, or if no height is known.
+    Return None without terrain, or if no altitude is known.
+
+    bounds: range of the grid, m, (2, 2), as returned by `scene_bounds`.
+    max_samples: largest number of samples along a side; fewer if the terrain data is coarser.
     """
     if terrain is None:
         return None
@@ -71,7 +80,11 @@ def ground_grid(terrain: Terrain | None, bounds: Floats, max_samples: int) -> Gr
 
 
 def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
-    """Return the factor by which heights are stretched to be visible: 1, 1.5, 2 or 3."""
+    """Return the factor by which heights are exaggerated so that they are visible: 1, 1.5, 2 or 3.
+
+    bounds: range of the scene, m, (2, 2), as returned by `scene_bounds`.
+    grid: ground of the scene; None without terrain.
+    """
     altitudes = setup.route.positions[:, 2]
     min_altitude, max_altitude = float(altitudes.min()), float(altitudes.max())
     if grid is not None:
@@ -82,7 +95,10 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
 
 
 def select_drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
-    """Return at most ``max_rows`` rows of the track with a known position, including the first and last."""
+    """Select at most `max_rows` rows of a track that have a position, evenly, with first and last row.
+
+    Return the indices of the rows.
+    """
     finite_rows = np.flatnonzero(np.isfinite(track.position).all(axis=1))
     return finite_rows[
         np.unique(np.linspace(0, max(len(finite_rows) - 1, 0), min(len(finite_rows), max_rows)).astype(np.intp))
@@ -90,7 +106,7 @@ def select_drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
 
 
 def script_json(data: object) -> str:
-    """Return JSON for an HTML script element.
+    """Encode data as JSON text that is safe within an HTML script element.
 
     "<", ">" and "&" are escaped, because "</script>" in a name would end the element early.
 
@@ -102,10 +118,10 @@ def script_json(data: object) -> str:
 
 
 def scene_data(view: SceneView) -> dict[str, object]:
-    """Return the scene as JSON data for the page; the flight only determines its extent.
+    """Convert a scene to JSON data for the page, lengths in m.
 
-    Lengths are in m.  "numbers" lists the index and the number of each numbered waypoint.  The heights of the ground
-    are 16-bit fractions of their range, little-endian, in base64.
+    The flight is not included; it only extends the range of the scene.  "numbers" lists the index and the number of
+    each numbered waypoint.  The heights of the ground are 16-bit fractions of their range, little-endian, in base64.
     """
     setup, failed = view.setup, view.failed
     bounds = scene_bounds(setup, view.track)
@@ -153,6 +169,6 @@ def scene_data(view: SceneView) -> dict[str, object]:
         ],
         **({"zones": zones} if zones else {}),
         "plan": np.round(setup.display_waypoints, 1).tolist(),
-        "numbers": [[k, stops[k]] for k in stop_rows(stops)],
+        "numbers": [[k, stops[k]] for k in stop_start_indices(stops)],
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }

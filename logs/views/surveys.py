@@ -21,9 +21,10 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Chart each survey of a flight in a panel, from above, rotated so that its lines are horizontal.
+    """Chart each survey of a flight in its own panel, from above.
 
-    Return None without a flown survey.
+    It is rotated so that its lines are horizontal.  Return None if the mission has no survey that is judged, or if the
+    track cannot be aligned with the route.
     """
     if not judged_surveys(setup):
         return None
@@ -55,10 +56,10 @@ def _make_survey_panel(
     position: Floats,
     name: str,
 ) -> Panel:
-    """Return the panel of one survey: usable, lost and unjudged parts of its photo lines, and the track.
+    """Draw one survey in a panel: usable, lost and unjudged parts of its photo lines, and the track.
 
-    line_measures: measurement of each photo line; None for a line that was not flown, which is lost as a whole.
-    position: positions of the track, m, (t, 3).
+    line_measures: measurement of each photo line; None for a line that was not flown: all of it is lost.
+    position: track positions during the survey, m, (t, 3).
     name: name of the survey in the panel's title.
     """
     origin = requirements.points[survey.first, :2]
@@ -66,7 +67,7 @@ def _make_survey_panel(
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
 
     def to_line_axes(positions: Floats) -> Floats:
-        """Convert positions to distances along and across the survey's lines, m."""
+        """Convert positions (n, 3) to distances along and to the left of the first line, m, (n, 2)."""
         return (positions[:, :2] - origin) @ axes
 
     usable_parts = [np.zeros((0, 2))]

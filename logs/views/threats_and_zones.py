@@ -1,4 +1,4 @@
-"""Draw threats and zones on the map (their outlines) and on the profile (their sections above the path)."""
+"""Describe threats and zones as layers of a map (outlines) and of a profile (vertical sections)."""
 
 from dataclasses import dataclass
 
@@ -27,12 +27,13 @@ _CIRCLE_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 def threat_circles(threats: Threats, route: Floats | None, failing_threats: frozenset[int]) -> tuple[Layer, ...]:
-    """Return layers of missiles and radars from above: the circle of each sphere, and a dot at each unit.
+    """Return layers of missiles and radars from above: the circle of each sphere, and a mark at each unit.
 
-    Each missile also has a filled circle, the section of its sphere at the altitude of the nearest path point.
+    Each missile also has a filled circle: the section of its sphere at the altitude of the nearest point of the route,
+    or the whole circle without a route.
 
-    route: waypoints (w, 3), m, or None to show only the spheres.
-    failing_threats: indices of the threats whose rule fails.
+    route: waypoints, m, (w, 3); None without a route.
+    failing_threats: indices of the threats for which a rule failed.
     """
     radars, sections, missiles, units = [], [], [], []
     missile_indices = np.flatnonzero(threats.kill_radius > 0.0)
@@ -78,7 +79,10 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
 
 
 def make_circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Return the east and north coordinates of the points of a closed circle, (73,) each."""
+    """Return east and north of the points of a closed circle, m, (73,) each.
+
+    center: east and north of the circle's center, m, (2,).
+    """
     return center[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), center[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
 
@@ -97,7 +101,14 @@ def threat_labels(threats: Threats, labelled_elsewhere: frozenset[int] = frozens
 
 
 def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floats | None) -> Floats:
-    """Return the radius (m) of each missile sphere's section at the altitude of the nearest path point."""
+    """Return the radius of missile spheres at the altitude of the nearest point of the route, m, (k,).
+
+    The nearest point is the horizontally nearest.  It is 0 if the route passes above or below the sphere; without a
+    route it is the sphere's radius.
+
+    indices: indices of the missiles, (k,).
+    route: waypoints, m, (w, 3); None without a route.
+    """
     radius = threats.kill_radius[indices]
     if route is None:
         return radius
@@ -112,11 +123,12 @@ def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floa
 
 
 def cut_sphere(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
-    """Return the altitude of the lower and upper surface of a sphere at each point, m AMSL, (s,) each.
+    """Return the altitudes of a sphere's lower and upper surface at points, m AMSL, (s,) each.
 
-    Both are NaN at points outside the sphere's circle.
+    Both are NaN at points horizontally outside the sphere.
 
-    center, points: (3,) and (s, 3), m.
+    center: center of the sphere, m, (3,).
+    points: points, m, (s, 3), whose altitude is ignored.
     """
     distance_square = ((points[:, :2] - center[:2]) ** 2).sum(axis=1)
     half_height = np.sqrt(np.where(distance_square <= radius**2, radius**2 - distance_square, np.nan))
@@ -126,10 +138,10 @@ def cut_sphere(center: Floats, radius: float, points: Floats) -> tuple[Floats, F
 def outline_label_position(
     kilometres: Floats, lower: Floats, upper: Floats, min_altitudes: Floats, max_altitude: float
 ) -> tuple[float, float, tuple[int, int]] | None:
-    """Find where to label the outline of a sphere in a vertical section.
+    """Choose where to label the outline of a sphere in a vertical section.
 
-    Returns distance (km), altitude (m AMSL) and the direction (right, up) in which the label lies; None if no part of
-    the outline is visible.
+    Return the distance (km) and the altitude (m AMSL) of a visible point of the outline, and the direction from there
+    to the label, as signs of right and up.  Return None if no part of the outline is visible.
 
     kilometres: distance of each sample along the section, km, (s,).
     lower, upper: altitude of the sphere's surface, m AMSL, (s,), NaN outside the sphere.
@@ -160,9 +172,9 @@ def outline_label_position(
 
 @dataclass(frozen=True, slots=True)
 class PathPlane:
-    """Vertical plane through a path, for its profile.
+    """The vertical plane through a path, in which its profile is drawn.
 
-    kilometres: distance of each sample along the path, km, (s,).
+    kilometres: position of each sample on the profile's horizontal axis, usually the distance along the path, km, (s,).
     points: positions of the samples, m, (s, 3).
     ground: ground altitude under the samples, m AMSL, (s,); None if unknown.
     min_altitude, max_altitude: altitude range of the profile, m AMSL.
@@ -175,7 +187,7 @@ class PathPlane:
     max_altitude: float
 
     def min_visible_altitudes(self) -> Floats:
-        """Return the lowest visible altitude at each sample, (s,) m AMSL: the ground, if it is in the picture."""
+        """Return the higher of the ground and the profile's lower edge at each sample, m AMSL, (s,)."""
         base = np.full(len(self.points), self.min_altitude)
         return base if self.ground is None else np.fmax(self.ground, self.min_altitude)
 
@@ -183,11 +195,10 @@ class PathPlane:
 def threat_cuts(
     threats: Threats, plane: PathPlane, labelled_elsewhere: frozenset[int]
 ) -> tuple[list[Layer], list[Label]]:
-    """Return layers of the sections of missile and radar spheres with a vertical plane, and their labels.
+    """Cut the spheres of missiles and radars by a vertical plane.
 
-    Radars come first.  At most `_MAX_CUT_NAMES` threats are labelled.
+    Return a layer of each section, and the labels.  Radars come first.  At most `_MAX_CUT_NAMES` threats are labelled.
 
-    plane: vertical plane along the path.
     labelled_elsewhere: indices of threats with their own labels.
     """
     layers: list[Layer] = []
@@ -220,9 +231,10 @@ def threat_cuts(
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return layers of the sections of entered spheres with a vertical plane, and label positions.
+    """Cut the spheres of failing threats by a vertical plane.
 
-    The label positions (km, m AMSL) are keyed by the index of the threat.
+    Return a layer of each section, and label positions.  The label positions (km, m AMSL) are keyed by the index of the
+    threat; threats without a visible outline have none.
     """
     layers, label_positions = [], {}
     for place in failed.threats:
@@ -244,7 +256,7 @@ def entered_cuts(
 
 
 def zone_text(zone: Zone) -> str:
-    """Return the name and the altitude band of a zone as text.
+    """Format the name of a zone, shortened to 24 characters, and its altitude band.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone_text(Zone("mast", "exclusion", Cylinder(0.0, 0.0, 90.0), ceiling=ZoneLevel(120.0, "ground")))
@@ -261,12 +273,15 @@ def zone_text(zone: Zone) -> str:
 
 
 def _format_level(level: ZoneLevel) -> str:
-    """Return an altitude limit of a zone as text, with its datum."""
+    """Format an altitude limit of a zone with its datum."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
 
 def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
-    """Return layers of zones from above: exclusion zones as areas with holes, inclusion zones as lines."""
+    """Return a layer of each zone from above.
+
+    An exclusion zone is an area with holes, an inclusion zone a line.
+    """
     layers = []
     for zone in zones:
         gap = np.full((1, 2), np.nan)
@@ -282,9 +297,10 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
 
 
 def zone_labels(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
-    """Return labels of zones: exclusion zones at the center, inclusion zones at the northernmost corner.
+    """Return a label with the name and the altitude band of each zone.
 
-    Returns no labels if there are more than `_MAX_ZONE_NAMES` zones.
+    There are none for more than `_MAX_ZONE_NAMES` zones.  It is at the center of an exclusion zone, and at the
+    northernmost corner of an inclusion zone.
     """
     if len(zones) > _MAX_ZONE_NAMES:
         return ()
@@ -299,11 +315,10 @@ def zone_labels(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ZoneCut:
-    """Part of the vertical plane through a path that a zone forbids.
+    """A part of the vertical plane through a path that a zone forbids.
 
-    zone: the zone.
     bottom, top: lower and upper end of the forbidden altitudes at each sample of the path, m AMSL, (s,).
-    is_forbidden: True at samples with forbidden altitudes, (s,).
+    is_forbidden: True at samples where the zone forbids these altitudes, (s,).
     """
 
     zone: Zone
@@ -315,8 +330,8 @@ class ZoneCut:
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
     """Return the parts of a vertical plane along a path that zones forbid.
 
-    An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.  Zones
-    away from the path are left out.
+    An exclusion zone forbids the altitudes from its floor to its ceiling.  An inclusion zone forbids the altitudes
+    below its floor and above its ceiling, and everything horizontally outside it.  Parts without samples are left out.
     """
     min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)
@@ -340,7 +355,10 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
-    """Return layers of the parts of the plane that zones forbid, and labels of exclusion zones."""
+    """Return a layer of each part of a vertical plane that a zone forbids, and labels of zones.
+
+    Only exclusion zones are labelled.  At most `_MAX_CUT_NAMES` parts are labelled.
+    """
     layers, labels = [], []
     for cut in zone_cuts(zones, plane):
         is_exclusion = cut.zone.kind == "exclusion"

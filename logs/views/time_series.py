@@ -19,21 +19,26 @@ _POWER_WINDOW_S = 2.0
 
 
 def to_float64(values: NDArray[np.float32]) -> Floats:
-    """Convert a column of the track to float64, so that computed values are not rounded again."""
+    """Convert float32 values of a track to float64, so that calculations with them add no rounding errors."""
     return values.astype(np.float64)
 
 
 def chart_over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
-    """Return a chart over time since the start, with a mark at the start of each leg."""
+    """Stack panels over the time since the start, with a mark at the start of each leg.
+
+    subject: what the panels show, for the title, e.g. "the flight over time".
+    panels: panels whose horizontal axis is time, s.
+    """
     title = f"{shorten(setup.scenario.name, 60)}: {subject}"
     marks = make_leg_marks(setup.route.leg_numbers_of(track.leg), track.time)
     return Chart(title, "time since the start", "s", tuple(panels), marks=marks, timed=True)
 
 
 def time_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Chart airspeed, bank, climb, load factor, wind, path errors and height above ground over time.
+    """Chart airspeed, bank, climb rate, load factor, wind, path errors and height above ground over time.
 
-    The height above ground is computed from track and terrain, not read from the log; without terrain it has no panel.
+    The height above ground is computed from track and terrain, not read from the log.  Its panel is omitted if the
+    scenario has no terrain.
     """
     time = track.time
     roll, _, _ = track.attitude.T
@@ -47,7 +52,7 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
     turn_limits = (("limit of planned turns; corrections may bank beyond it", bank_limit), ("", -bank_limit))
 
     def make_single_line_panel(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
-        """Make a panel with one line."""
+        """Make a panel with one line; `min_span` is the smallest range that its vertical axis shows."""
         return Panel(title, unit, (series(name, "flown", time, values),), min_span=min_span)
 
     panels = [
@@ -75,7 +80,7 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
 def control_chart(setup: FlightSetup, track: Track) -> Chart:
     """Chart commanded and actual elevator, aileron, rudder and throttle over time.
 
-    The chart is shaded where the command is at or beyond the limit of the control.
+    Times at which a command is at or beyond the control's limit are shaded.
     """
     panels = []
     limits = control_limits(setup.aircraft)
@@ -102,8 +107,8 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
 def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     """Chart battery energy used, power, current, and the aircraft's specific energy over time.
 
-    The specific energy is shown as a height.  For an aircraft that burns fuel, the heat of the fuel replaces the
-    battery energy, and there is no current.
+    The specific energy is shown as a height, m.  An aircraft that burns fuel has a panel of the fuel's heat instead of
+    the battery energy, and no panel of the current.
     """
     burns_fuel = setup.envelope.power_level.size > 0 and not setup.envelope.volts
     store_name, unit, power_unit, scale = (
@@ -134,19 +139,20 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
 
 # Exposure along the flown track.
 
-# Largest number of straight segments that replace the track for the curve; the sums are those over these segments.
+# Largest number of straight segments that replace the track; exposures are summed over these segments.
 _MAX_SEGMENTS = 12_000
 
 
 def compute_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Return the exposure rate on each segment of a track, (t - 1,), summed over spheres.
+    """Return the exposure rate on each segment of a track, (t - 1,), summed over all spheres.
 
-    The rate is the segment's mean of (scale/d)^4 within a sphere (paper eq. 9, 10): 1 at a distance of one scale.  It
-    is NaN where the track is unknown.
+    The rate is the mean over the segment of (scale / d)^4, where d is the distance from the sphere's centre; it is 0
+    outside the sphere (paper eq. 9, 10).  Segments with an unknown end (NaN) have the rate NaN.
 
-    position: (t, 3) m.
-    centres: (m, 3) m.
-    radii, scales: (m,) m.
+    position: ends of the segments, m, (t, 3).
+    centres: centres of the spheres, m, (m, 3).
+    radii: radius of each sphere, m, (m,); spheres with radius 0 are ignored.
+    scales: distance at which the rate is 1, for each sphere, m, (m,).
     """
     return _sum_exposure_rates(
         np.ascontiguousarray(position), np.ascontiguousarray(centres), np.ascontiguousarray(radii), scales.copy()
@@ -155,7 +161,7 @@ def compute_exposure_rates(position: Floats, centres: Floats, radii: Floats, sca
 
 @compiled
 def _sum_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Return the exposure rate on each segment, summed over spheres, as `compute_exposure_rates` does."""
+    """Compute the result of `compute_exposure_rates` from contiguous arrays."""
     count = position.shape[0] - 1
     rates = np.zeros(max(0, count))
     for k in range(count):
@@ -167,9 +173,10 @@ def _sum_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales
 
 
 def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Chart the kill and detection exposure, as a rate and as a sum, over the distance flown (km).
+    """Chart the exposure to kill and to detection over the distance flown (km).
 
-    Only exposure that occurred is shown; return None if there was none.
+    It is shown as a rate and summed over time.  An exposure that was zero throughout has no panels.  Return None if
+    both were zero or the track has fewer than two known positions.
     """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:

@@ -1,4 +1,4 @@
-"""Chart the findings with a place on the route, by turn and leg: planned value, flown value and limit."""
+"""Chart a verdict's findings by turn and leg: planned value, flown value and limit."""
 
 import math
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ from logs.views.charts import Chart, Layer, Panel, shorten
 
 # Margin of a panel above and below its values, as a fraction of their span.
 _MARGIN = 0.12
-# A limit above the largest value times this ratio is omitted.
+# Limits of turns and corridor above the largest value times this ratio are not drawn.
 _MAX_LIMIT_RATIO = 4.0
-# Panels of the chart: rule, kind of place, title and unit.
+# Panels of the chart: rule, kind of place on the horizontal axis, title and unit.
 PLACE_PANELS = (
     ("turn", "waypoint", "turn", "°"),
     ("slope", "leg", "slope", "°"),
@@ -26,7 +26,12 @@ PLACE_PANELS = (
 
 @dataclass(frozen=True, slots=True)
 class PlaceValue:
-    """Values of a finding at one waypoint or leg, in the unit of the finding; NaN if not stated."""
+    """The values of a finding at one waypoint or leg.
+
+    number: number of the waypoint or leg in messages.
+    planned, flown, limit: planned value, flown value and limit, in the unit of the finding; NaN if unknown.
+    ok: True if the finding passed, False if it failed, None if it is undecided.
+    """
 
     number: int
     planned: float
@@ -36,7 +41,7 @@ class PlaceValue:
 
 
 def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """Return the values of a rule's findings, sorted by the number of the waypoint or leg."""
+    """Return the values of a rule's findings on waypoints and legs, sorted by their number."""
     place_rows = []
     for finding in findings:
         place = finding.place
@@ -51,10 +56,11 @@ def list_place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
-    """Chart turns, slopes, clearances, waypoints and corridor; each has a panel if the verdict judged it.
+    """Chart turns, slopes, clearances, waypoint distances and corridor.
 
-    Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.  Limits far above all values
-    are not drawn; a note states the lowest of them.
+    Each has a panel if the verdict judged it.  Bars are planned values, dots flown values, dashes limits; rings mark
+    failures.  Limits of turns and of the corridor that are far above all values are not drawn; a note states the lowest
+    of them.
 
     name: name of the scenario.
 

@@ -19,10 +19,10 @@ _MIN_OVERLAP_FRACTION = 0.5
 
 
 class ClockShift(NamedTuple):
-    """Shift between the clocks of two signals.
+    """The shift between the clocks of two signals.
 
     shift: time to add to the times of the first signal, s.
-    correlation: correlation of both signals after the shift.
+    correlation: correlation coefficient of both signals after the shift.
     """
 
     shift: float
@@ -32,13 +32,14 @@ class ClockShift(NamedTuple):
 def find_clock_shift(
     time: Floats, values: Floats, other_time: Floats, other_values: Floats, max_shift: float
 ) -> ClockShift:
-    """Find the time shift of the first signal with the best correlation to the second signal.
+    """Find the time shift at which the first signal correlates best with the second signal.
 
-    Shifts are tried first in coarse steps, then in fine steps around the best one.  The signals are linearly
-    interpolated.  The correlation is 0 if the signals have too little time in common or do not vary.
+    Shifts are tried first in coarse steps, then in fine steps around the best shift.  The signals are linearly
+    interpolated.  Shift and correlation are 0 if the signals have too little time in common, do not vary, or have no
+    positive correlation at any shift.
 
-    time, values: times, s, and values of the first signal, (n,).
-    other_time, other_values: the same for the second signal, (m,).
+    time, values: times (s) and values of the first signal, (n,).
+    other_time, other_values: times (s) and values of the second signal, (m,).
     max_shift: largest shift in either direction, s.
 
     >>> time = np.arange(0.0, 100.0, 0.1)

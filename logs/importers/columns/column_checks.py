@@ -1,4 +1,4 @@
-"""Check the quantities of a table of columns against each other, to find wrong signs, frames, units and clocks."""
+"""Check the quantities of a log against each other, to find wrong signs, frames, units and clocks."""
 
 import math
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from world.errors import LogError
 
 # Interval of the grid on which quantities are compared, s; rates are means over it.
 _STEP_S = 0.5
-# Minimum pause between samples of the ground speed that shows that the recorder stopped, s.
+# Shortest pause between samples of the ground speed that shows that the recorder stopped, s.
 _MIN_GAP_S = 5.0
 # Ground speed above which the aircraft flies, m/s.
 _FLYING_MPS = 6.0
@@ -25,28 +25,28 @@ _CLEAR_CORRELATION = 0.6
 _MAX_RATIO = 1.25
 # Shifts at which two measurements of one quantity are compared, s.
 _SHIFTS_S = np.arange(-5.0, 5.01, 0.25)
-# Minimum shift that counts as a delay, s; receivers and estimators are later than inertial sensors by up to 0.3 s.
+# Shortest shift that is reported as a delay, s; receivers and estimators lag inertial sensors by up to 0.3 s.
 _LATE_S = 0.5
 # Minimum correlation at the best shift for a delay to be reported.
 _SHIFTED_CORRELATION = 0.8
-# Largest ratio of the unexplained variance at the best shift to that without a shift, for a delay to be reported.
+# Largest ratio of the unexplained variance at the best shift to the one without a shift, for a delay to be reported.
 _SHIFTED_RESIDUAL = 0.5
-# Minimum duration for which a working sensor never repeats a value, s.
+# Time after which a sensor that repeats one value is stuck, s.
 _FROZEN_S = 20.0
-# The same duration for coarsely rounded values, as a multiple of the 95th percentile of the times between changes.
+# That time for coarsely rounded values, as a multiple of the 95th percentile of the times between changes.
 _FROZEN_RUNS = 10.0
-# Least mean wind whose direction is checked, m/s.
+# Smallest mean wind whose direction is checked, m/s.
 _CLEAR_WIND_MPS = 2.5
-# Accepted range of the logged wind, relative to the wind that follows from ground velocity, airspeed and heading; the
-# component along the latter is compared.
+# Accepted range of the logged wind's component along the wind that follows from ground velocity, airspeed and heading,
+# relative to that wind.
 _WIND_RATIO_RANGE = (0.4, 1.7)
-# Least number of rows in flight that are compared.
+# Smallest number of rows in flight that are compared.
 _MIN_ROWS = 40
 # Range of the median specific force along the axis down in flight, m/s^2; a circle at 60 degrees of bank has -19.6.
 _FORCE_RANGE_MPS2 = (-20.0, -4.0)
-# Limit of the absolute mean of exp(i angle), which is 1 for a constant angle and about 0 for one that takes all values.
-# If the angle is course minus heading, more than this shows that both turn together; if it is the heading, that the
-# flight has no turns.
+# Limit of the absolute mean of exp(i angle), which is 1 for a constant angle and about 0 for an angle that takes all
+# values.  A larger mean of course minus heading shows that both turn together; a larger mean of the heading shows that
+# the flight has no turns.
 _CLEAR_ALIGNMENT = 0.7
 # Largest mean angle between heading and ground course, rad.
 _MAX_HEADING_DIFFERENCE_RAD = math.radians(50.0)
@@ -61,8 +61,8 @@ _SENSORS = (
     *("acceleration_forward", "acceleration_right", "acceleration_down"),
 )
 # A quantity must follow the partner of its pair if one of them has a larger standard deviation than this, SI units and
-# rad.  The lateral acceleration
-# is not listed: in a turn without sideslip it is less than the noise of a receiver's velocities.
+# rad.  The lateral acceleration is not listed: in a turn without sideslip it is less than the noise of a receiver's
+# velocities.
 _LEAST_MOTIONS = {
     **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), math.radians(1.0)),
     **dict.fromkeys(("velocity_north", "velocity_east", "velocity_down"), 1.0),
@@ -73,24 +73,24 @@ _LEAST_CORRELATION = 0.5
 # Largest ratio between the airspeed and the airspeed from ground velocity and heading; air density and position error
 # explain a ratio of 1.2.
 _MAX_AIRSPEED_RATIO = 1.35
-# Least median airspeed in flight, m/s.
+# Smallest median airspeed in flight, m/s.
 _MIN_AIRSPEED_MPS = 2.0
-# Least range of a throttle that moves.
+# Smallest range of a throttle that moves, as a fraction.
 _MIN_THROTTLE_RANGE = 0.01
-# Minimum range of the current, from its 5th to its 95th percentile, that only the throttle can cause, A.
+# Smallest range of the current, from its 5th to its 95th percentile, that only the throttle can cause, A.
 _MIN_CURRENT_RANGE_A = 3.0
 _EARTH_RADIUS_M = 6_371_008.8
 
 
 class _Pair(NamedTuple):
-    """Quantity and values that follow from other quantities: both must agree or vary together.
+    """A logged quantity, and the values that other logged quantities (its partner) give for it.
 
     quantity: the quantity that is checked.
-    partner: text that names the other quantities, such as "the change of altitude".
+    partner: name of the other quantities in messages, such as "the change of altitude".
     series: values of the quantity.
-    expected: values that follow from the other quantities, at the times of the grid, (n,).
+    expected: values that follow from the partner, at the times of the grid, (n,).
     exact: True if both must be equal, False if they only vary together.
-    simultaneous: True if both vary at the same time, False if the motion delays the partner.
+    simultaneous: True if both vary at the same time, False if one follows the other with a delay.
     """
 
     quantity: str
@@ -102,7 +102,7 @@ class _Pair(NamedTuple):
 
 
 def check_signs_and_units(log: ColumnLog) -> None:
-    """Raise LogError for the first quantity that contradicts the others.
+    """Raise LogError for the first quantity of a log that contradicts the others.
 
     The message names the key of the table to check.  Nothing is checked for a log with too few rows in flight.
     """
@@ -151,7 +151,7 @@ def check_signs_and_units(log: ColumnLog) -> None:
 def _make_flying_grid(log: ColumnLog) -> Floats:
     """Return the times of a regular grid at which the aircraft flies and the log has rows, s, (n,).
 
-    The grid is empty for a log without ground velocity and ground speed.
+    The grid is empty for a log that has neither the ground velocity nor the ground speed.
     """
     if log.has("velocity_north", "velocity_east"):
         north, east = log.series("velocity_north"), log.series("velocity_east")
@@ -178,9 +178,9 @@ def _select_finite_rows(series: Series) -> tuple[Floats, Floats]:
 def _average_on_grid(series: Series, grid: Floats, *, wraps: bool = False) -> Floats:
     """Return the mean of a series over an interval of `_STEP_S` around each time of a grid, (n,).
 
-    An interval without rows gets the interpolated value.
+    For an interval without rows, it is the interpolated value.
 
-    wraps: True for an angle that jumps at full turns.
+    wraps: True for an angle that jumps at full turns; the jumps are removed.
     """
     time, values = _select_finite_rows(series)
     values = np.unwrap(values) if wraps else values
@@ -193,8 +193,8 @@ def _average_on_grid(series: Series, grid: Floats, *, wraps: bool = False) -> Fl
 def _differentiate_on_grid(series: Series, grid: Floats, *, wraps: bool = False, step: float = _STEP_S) -> Floats:
     """Return the rate of change of a series at each time of a grid, per second, (n,).
 
+    wraps: True for an angle that jumps at full turns; the jumps are removed.
     step: interval around each time over which the rate is computed, s.
-    wraps: True for an angle that jumps at full turns.
     """
     time, values = _select_finite_rows(series)
     values = np.unwrap(values) if wraps else values
@@ -203,7 +203,7 @@ def _differentiate_on_grid(series: Series, grid: Floats, *, wraps: bool = False,
 
 
 def _list_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
-    """Yield the pairs of measurements to check, which must agree or vary together."""
+    """Yield a pair for each quantity that other quantities of the log determine; see `_Pair`."""
     if log.has("velocity_down", "altitude"):
         sink = -_differentiate_on_grid(log.series("altitude"), grid)
         yield _Pair("velocity_down", "the change of altitude", log.series("velocity_down"), sink)
@@ -260,7 +260,10 @@ def _list_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
 
 
 def _find_ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
-    """Return the ground velocity on the grid, m/s, (n,), north + i east; None if it is unknown."""
+    """Return the ground velocity at the times of a grid as north + i east, m/s, (n,).
+
+    Return None if the log lacks it.
+    """
     if log.has("velocity_north", "velocity_east"):
         north, east = (_average_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east"))
         return np.asarray(north + 1j * east)
@@ -271,11 +274,11 @@ def _find_ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128
 
 
 class _Triangle(NamedTuple):
-    """Triangle of ground velocity, airspeed and wind; complex numbers are north + i east.
+    """A triangle of ground velocity, air velocity and wind; complex numbers are north + i east.
 
     velocity: ground velocity, m/s, (n,).
-    factor: factor of the logged airspeed with which the triangle fits best.
-    wind: mean wind, m/s.
+    factor: factor by which the logged airspeed must be multiplied for the best fit.
+    wind: velocity of the mean wind, m/s.
     """
 
     velocity: NDArray[np.complex128]
@@ -284,10 +287,10 @@ class _Triangle(NamedTuple):
 
 
 def _fit_wind_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
-    """Fit the wind triangle: ground velocity = factor * airspeed along the heading + wind.
+    """Fit the factor and the wind in: ground velocity = factor * airspeed along the heading + wind.
 
-    Return None if the log lacks one of these quantities.  Return None also for a flight without turns, because only
-    turns distinguish the wind from an error of the airspeed.  All velocities are complex numbers, as in `_Triangle`.
+    Return None if the log lacks one of these quantities, or if the airspeed is constant at 0.  Return None also for a
+    flight without turns, because only turns distinguish the wind from an error of the airspeed.
     """
     velocity = _find_ground_velocity(log, grid)
     if velocity is None or not log.has("airspeed", "yaw"):
@@ -306,7 +309,8 @@ def _fit_wind_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
 def _make_contradiction_error(log: ColumnLog, quantity: str, message: str, hint: str) -> LogError:
     """Return the error for a quantity that contradicts the others.
 
-    hint: text on what to check in the table.
+    message: what the quantity's column does, after the name of the column.
+    hint: what to check in the table.
     """
     field = f"columns.{quantity}"
     text = f"{log.table_path}: {field}: {log.column(quantity)} {message}: {hint}"
@@ -314,7 +318,7 @@ def _make_contradiction_error(log: ColumnLog, quantity: str, message: str, hint:
 
 
 def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
-    """Raise LogError for a sensor that repeats one value for too long in flight.
+    """Raise LogError if a sensor repeats one value for too long in flight.
 
     A current of 0 A is accepted, because the motor may be idle.
     """
@@ -340,10 +344,10 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if the measurements of a pair contradict each other.
+    """Raise LogError if a quantity contradicts the values that its partner gives for it.
 
-    They contradict each other if they vary in opposite directions, do not correlate, or differ by a factor although
-    they should be equal.
+    It contradicts them if both vary in opposite directions, do not correlate although they move, or differ by a factor
+    although they should be equal.
 
     With errors in both measurements, the factor lies between r c and r / c, where r is the ratio of the standard
     deviations and c the correlation (Frisch 1934).
@@ -365,11 +369,11 @@ def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 
 
 def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if a measurement leads or lags its partner by `_LATE_S` or more.
+    """Raise LogError if a quantity leads or lags its partner by `_LATE_S` or more.
 
-    The delay is the shift with the best correlation, if it correlates clearly better than no shift.  It is ignored if
-    the shifted measurement varies more or less than its partner, because both then show different motions.  Pairs that
-    are not simultaneous, and short flights, are not checked.
+    The delay is the shift with the best correlation, if that is clearly better than without a shift.  It is ignored if
+    the shifted quantity must equal its partner but varies more or less, because both then show different motions.
+    Pairs that are not simultaneous, and short flights, are not checked.
     """
     is_inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
     if not pair.simultaneous or np.count_nonzero(is_inner) < _MIN_ROWS:
@@ -390,10 +394,10 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 
 
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError for an airspeed near zero in flight, or one that contradicts velocity and heading.
+    """Raise LogError if the airspeed is near zero in flight, or contradicts ground velocity and heading.
 
-    The contradiction is found only in a flight with turns.  There, a logged wind that contradicts the wind of the
-    velocity triangle also raises LogError.
+    Contradictions are found only in a flight with turns.  There, LogError is also raised if the logged wind contradicts
+    the wind that follows from ground velocity, airspeed and heading.
     """
     airspeed, column = _average_on_grid(log.series("airspeed"), grid), log.column("airspeed")
     if np.median(airspeed) < _MIN_AIRSPEED_MPS:

@@ -1,4 +1,4 @@
-"""Read the series of a flight log by its table of columns, in SI units and radians on one clock."""
+"""Read quantities of a flight log by its table of columns, in SI units and rad on one clock."""
 
 import hashlib
 import math
@@ -48,10 +48,10 @@ _UTC_AFTER_S = 3e8
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Values of one quantity.
+    """One quantity over time.
 
     time: times on the main clock, s, (n,).
-    values: (n,); NaN for rows without a value.
+    values: values of the quantity, (n,); NaN for rows without a value.
     """
 
     time: Floats
@@ -60,11 +60,11 @@ class Series:
 
 @dataclass(slots=True)
 class _Clock:
-    """Clock of a data file.
+    """The times of the rows of a data file.
 
     data: the file.
-    time: times as in the file plus the stated offset, s, (n,).
-    rate: rows per second.
+    time: times in the file plus the offset that the table states, s, (n,).
+    rate: mean number of rows per second.
     """
 
     data: DataFile
@@ -73,13 +73,16 @@ class _Clock:
 
 
 class ColumnLog:
-    """Flight log that is read by a table of columns.
+    """A flight log in data files that a table of columns describes.
 
-    path: the table, or a data file with a table next to it.
+    path: path of the table, or of a data file with a table next to it.
     """
 
     def __init__(self, path: Path) -> None:
-        """Read the table of columns, and check that the data files have its columns."""
+        """Read the table of columns and the data files.
+
+        Raises LogError if a file cannot be read, or if a data file lacks a column that the table names.
+        """
         table_path = path if is_column_table_name(path) else find_column_table(path)
         self.path, self.table_path = path, table_path
         self.table: LogTable = read_column_table(table_path)
@@ -95,14 +98,14 @@ class ColumnLog:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the table and of all data files."""
+        """SHA-256 of the log: of the bytes of the table and of `data_sha256`."""
         return hashlib.sha256(self.table_path.read_bytes() + self.data_sha256.encode()).hexdigest()
 
     @property
     def data_sha256(self) -> str:
         """SHA-256 of the bytes of all data files, in the order of their paths.
 
-        It identifies the log from which an aircraft was identified, even if the table is edited.
+        It stays the same if the table is edited, and so shows from which log an aircraft was identified.
         """
         digest = hashlib.sha256()
         for path in sorted({self._find_data_path(clock) for clock in self.table.clocks.values()}):
@@ -115,17 +118,20 @@ class ColumnLog:
         return all(quantity in named or self._is_from_quaternion(quantity) for quantity in quantities)
 
     def _is_from_quaternion(self, quantity: str) -> bool:
-        """Return True if a quantity is an angle that is computed from the table's quaternion."""
+        """Return True for an angle that must be computed from the quaternion, as it has no column."""
         named = self.table.columns.keys()
         return quantity in ANGLES and quantity not in named and named >= set(QUATERNION)
 
     def column(self, quantity: str) -> str:
-        """Return the column of the first entry of a quantity, or the quantity's name for a constant."""
+        """Return the column of a quantity's first entry, or the quantity's name for a constant.
+
+        For an angle from the quaternion, it is the column of the quaternion's first component.
+        """
         source = QUATERNION[0] if self._is_from_quaternion(quantity) else quantity
         return self.table.columns[source][0].column or quantity
 
     def unit(self, quantity: str) -> str:
-        """Return the unit of the first column that is mapped to a quantity."""
+        """Return the unit of a quantity's first entry in the table."""
         return self.table.columns[quantity][0].unit
 
     def frame(self, quantity: str) -> str:
@@ -133,11 +139,12 @@ class ColumnLog:
         return self.table.columns[quantity][0].frame or QUANTITIES[quantity].frames[0]
 
     def series(self, quantity: str) -> Series:
-        """Return a quantity in SI units and radians, in its default frame.
+        """Read a quantity in SI units and radians, in its default frame.
 
-        If a quantity has several entries, each row has the value of the first entry whose condition is met.
+        If a quantity has several entries, each row has the value of the first entry whose condition the row meets.
 
-        Raises LogError for a missing column, text in place of numbers, and implausible values.
+        Raises LogError for a missing column, text in place of numbers, implausible values, and entries with different
+        numbers of rows.
         """
         if self._is_from_quaternion(quantity):
             return self._compute_angle(quantity)
@@ -156,8 +163,8 @@ class ColumnLog:
     def _compute_angle(self, angle: str) -> Series:
         """Compute roll, pitch or yaw, rad, from the logged attitude quaternion.
 
-        The quaternion leads from body axes FRD to NED, or from FLU to ENU.  Raises LogError if its components have
-        different times, or if its norm is not 1.
+        The quaternion rotates from body axes FRD to NED, or from FLU to ENU.  Raises LogError if its components have
+        different times, or if more than a few percent of its norms differ clearly from 1.
         """
         parts = [self.series(name) for name in QUATERNION]
         time = parts[0].time
@@ -179,7 +186,10 @@ class ColumnLog:
         return Series(time, factor * angles[angle]() + offset)
 
     def raw_values(self, quantity: str) -> tuple[Floats, Column]:
-        """Return the times, s, and the unconverted values of a quantity, such as the names of modes."""
+        """Return the times (s) and the unconverted values of a quantity's first entry.
+
+        The values may be texts, such as names of modes.
+        """
         entry = self.table.columns[quantity][0]
         clock = self._get_clock(entry.clock)
         return self._align_times(entry.clock), self._find_column_on_clock(
@@ -187,10 +197,10 @@ class ColumnLog:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the autopilot's parameters by name, from the parameter columns and from [parameters].
+        """Return the autopilot's parameters, keyed by name, from the parameter columns and from [parameters].
 
-        A value in [parameters] takes precedence.  Column values that are not finite are left out.  Raises LogError if
-        the columns of names and values differ in length.
+        A value in [parameters] takes precedence.  Values in the columns that are not finite are left out.  Raises
+        LogError if the columns of names and values differ in length.
         """
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
@@ -210,13 +220,18 @@ class ColumnLog:
     # Files and clocks.
 
     def _make_error(self, field: str, value: Any, allowed: str) -> LogError:
-        """Return the error for a wrong value of a field of the table, with the allowed values."""
+        """Return the error for a wrong value in the table.
+
+        field: key in the table, such as "columns.roll.unit".
+        allowed: text on the allowed values.
+        """
         return LogError.at(self.table_path, field, value, allowed)
 
     def _find_data_path(self, clock: ClockTable) -> Path:
-        """Return the data file of a clock: the clock's file, else the opened data file, else the table's file.
+        """Return the path of a clock's data file.
 
-        Raises LogError if none of them is named.
+        It is the file that the clock names, else the data file from which the log was opened, else the file that the
+        table names.  Raises LogError if there is none.
         """
         if clock.file is not None:
             return self.table_path.parent / clock.file
@@ -238,15 +253,18 @@ class ColumnLog:
         return self._files[path]
 
     def _get_clock(self, name: str) -> _Clock:
-        """Return the clock with a name; its times are read at the first call."""
+        """Return the clock with a name; its times are read only at the first call."""
         if name not in self._clocks:
             self._clocks[name] = self._read_clock(name, self.table.clocks[name])
         return self._clocks[name]
 
     def _read_clock(self, name: str, clock: ClockTable) -> _Clock:
-        """Read a clock's times, or count its rows if it has no column of times.
+        """Read the times of a clock.
 
-        Raises LogError for missing, decreasing or too many times, and for a stated rate that contradicts the times.
+        Without a column of times, compute them from the number of rows and the rate.
+
+        Raises LogError for missing or decreasing times, fewer than two different times, too long a log, and a stated
+        rate that contradicts the times.
         """
         data, field = self._open_data_file(clock), f"clocks.{name}"
         if clock.column is None:
@@ -300,7 +318,11 @@ class ColumnLog:
 
     @cached_property
     def start(self) -> float:
-        """Time of the main clock that becomes time 0, s: its first time if it counts from 1970, otherwise 0."""
+        """Time on the main clock that becomes time 0, s.
+
+        It is the clock's first time if the clock counts from 1970, otherwise 0.  In the first case, `utc_start` is set
+        to it.
+        """
         first = float(self._get_clock(self._main_clock).time[0])
         if first > _UTC_AFTER_S:
             self.utc_start = first
@@ -325,18 +347,18 @@ class ColumnLog:
         return self._get_unaligned_times(name) + self._align_clock(name)
 
     def _get_unaligned_times(self, name: str) -> Floats:
-        """Return the times of a clock before its alignment, s.
+        """Return the times of a clock without the shift of its `align`, s.
 
-        Dates become seconds since the start of the main clock.
+        Times that count from 1970 become seconds since `start`.
         """
         time = self._get_clock(name).time
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
     def _align_clock(self, name: str) -> float:
-        """Return the time to add to a clock to align it with the main clock, s; 0 without `align`.
+        """Return the shift that aligns a clock with the main clock, to be added to its times, s.
 
-        The shift is the one with the best correlation between the two signals in `align`.  Raises LogError if the
-        correlation is too small at every shift.
+        It is 0 without `align`.  At this shift, the two signals that `align` names correlate best.  Raises LogError if
+        their correlation is too small at every shift.
         """
         align = self.table.clocks[name].align
         if align is None:
@@ -384,9 +406,12 @@ class ColumnLog:
         return data.columns[name]
 
     def _find_column_on_clock(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
-        """Return a column that uses a clock.
+        """Return a column of the data file of a clock.
 
-        Raises LogError if the column and the clock have different numbers of rows.
+        Raises LogError if the file lacks the column, or if column and clock have different numbers of rows.
+
+        field: key of the table that names the column.
+        clock_name: name of the clock for the message.
         """
         values = self._find_column(clock.data, name, field)
         if len(values) != len(clock.time):
@@ -399,11 +424,14 @@ class ColumnLog:
         return f"{data.path}: {name}"
 
     def _read_entry(self, quantity: str, entry: ColumnTable) -> Series:
-        """Return the series of one entry in SI units, radians and the default frame.
+        """Read one entry of a quantity, in SI units, radians and the default frame.
 
-        Only rows in the time span that the table states are returned.  Rows that do not meet the entry's condition are
-        NaN.  An entry with a rate has only the rows in which its value changes, and a constant all rows of the main
-        clock.  Raises LogError for implausible values, and for values that change more often than the stated rate.
+        A constant has a row for each time of the main clock.  Otherwise, only rows in the table's time span are
+        returned, and rows that do not meet the entry's condition are NaN.  If the entry states a rate, only rows in
+        which the value changes are returned.
+
+        Raises LogError for implausible values, values that change more often than the stated rate, and a time span
+        without rows.
         """
         if entry.value is not None:
             time = self._align_times(self._main_clock)
@@ -444,16 +472,18 @@ class ColumnLog:
         return Series(time, values)
 
     def _convert(self, quantity: str, entry: ColumnTable, raw: Floats) -> Floats:
-        """Convert values of an entry to SI units, radians and the default frame."""
+        """Convert the numbers in a column to SI units, radians and the default frame, as the entry describes."""
         factor = UNITS[QUANTITIES[quantity].dimension][entry.unit]
         frame_factor, frame_offset = to_default_frame(quantity, entry.frame)
         scaled = entry.sign * (entry.scale * raw + entry.offset)
         return np.asarray(frame_factor * (factor * scaled + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
 
     def _check_plausible(self, quantity: str, entry: ColumnTable, values: Floats) -> None:
-        """Raise LogError for values outside the plausible range of a quantity.
+        """Raise LogError if an entry has no values, or too many of them are implausible.
 
-        The message states the unit in which they would be plausible, if there is one.
+        The message names the unit in which they would be plausible, if there is one.
+
+        values: values in SI units, radians and the default frame.
         """
         known = values[np.isfinite(values)]
         if not known.size:
@@ -476,16 +506,16 @@ class ColumnLog:
 
 
 def decode_cell(value: Any) -> str:
-    """Return a cell of a text column, which may be bytes, as a str."""
+    """Convert a cell of a text column to text; bytes are decoded as UTF-8."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _parse_numbers(values: Column, place: str) -> Floats:
-    """Return a column as numbers; an empty text becomes NaN.
+    """Convert a column to numbers; empty texts and missing values become NaN.
 
     Raises LogError for a text that is not a number.
 
-    place: file and column for the message.
+    place: file and column, with which the message starts.
     """
     if values.dtype.kind in "fiub":
         return values.astype(np.float64)

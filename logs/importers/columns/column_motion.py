@@ -1,4 +1,7 @@
-"""Read the motion of an aircraft by a table of columns, as `motion_log` does from ArduPilot's logs."""
+"""Read the motion of an aircraft from a log with a table of columns, for an identification.
+
+`logs.importers.motion_log` reads the same from ArduPilot's logs.
+"""
 
 import math
 from dataclasses import dataclass
@@ -26,7 +29,7 @@ _INERTIAL = (
     *("acceleration_forward", "acceleration_right", "acceleration_down"),
     *("roll_rate", "pitch_rate", "yaw_rate"),
 )
-# Commands that an identification needs, each with the pairs of surfaces from which it can be computed.
+# Commands that an identification needs, each with the pairs of left and right halves from which it can be computed.
 _COMMANDS = {
     "elevator": (("elevon_left", "elevon_right"), ("elevator_left", "elevator_right")),
     "aileron": (("elevon_left", "elevon_right"), ("aileron_left", "aileron_right")),
@@ -35,11 +38,11 @@ _COMMANDS = {
 
 
 def read_column_motion(path: Path) -> MotionLog:
-    """Read the motion of an aircraft from a data file, as a table of columns describes it.
-
-    path: a table of columns, or a data file with a table next to it.
+    """Read the motion of an aircraft from a log with a table of columns.
 
     Raises LogError for a file that cannot be read, and for quantities that contradict each other.
+
+    path: path of the table, or of a data file with a table next to it.
     """
     log = ColumnLog(path)
     check_signs_and_units(log)
@@ -81,16 +84,17 @@ def read_column_motion(path: Path) -> MotionLog:
 
 
 def _read_joined_series(log: ColumnLog, *quantities: str) -> Samples:
-    """Return several quantities as columns of one series, (n, k); no rows if the table lacks one of them."""
+    """Read k quantities as the columns of one series, (n, k); no rows if the table lacks one of them."""
     if not log.has(*quantities):
         return NO_SAMPLES
     return join_series([log.series(quantity) for quantity in quantities])
 
 
 def join_series(parts: list[Series]) -> Samples:
-    """Join series as columns at the times of the longest series, with linear interpolation, (n, k).
+    """Join k series as the columns of one series at the times of the longest, (n, k).
 
-    Rows with a missing value are left out; there are no rows if a series has fewer than two values.
+    Shorter series are interpolated linearly.  Rows with a missing value are left out.  There are no rows if a series to
+    be interpolated has fewer than two values.
     """
     longest = max(parts, key=lambda part: len(part.time))
     columns = []
@@ -106,16 +110,20 @@ def join_series(parts: list[Series]) -> Samples:
 
 
 def _read_attitude(log: ColumnLog) -> Samples:
-    """Return roll, pitch and yaw without jumps at full turns, rad, (n, 3); no rows if the table lacks one."""
+    """Read roll, pitch and yaw, without jumps at full turns, rad, (n, 3).
+
+    There are no rows if the table lacks one of them.
+    """
     attitude = _read_joined_series(log, "roll", "pitch", "yaw")
     return Samples(attitude.time, np.unwrap(attitude.values, axis=0)) if len(attitude.time) else attitude
 
 
 def read_velocity(log: ColumnLog) -> Samples:
-    """Return the ground velocity to north, east and down, m/s, (n, 3).
+    """Read the ground velocity to north, east and down, m/s, (n, 3).
 
-    The horizontal velocity comes from its components, or else from ground speed and course; the vertical velocity from
-    the log, or else from the altitude.  There are no rows if the table lacks the columns for one of them.
+    The horizontal velocity comes from its components, or else from ground speed and course.  The vertical velocity
+    comes from its own column, or else from the change of altitude.  There are no rows if the table lacks the columns
+    for either.
     """
     if log.has("velocity_north", "velocity_east"):
         parts = [log.series("velocity_north"), log.series("velocity_east")]
@@ -134,7 +142,10 @@ def read_velocity(log: ColumnLog) -> Samples:
 
 
 def _interpolate_at(series: Series, time: Floats, *, wraps: bool = False) -> Floats:
-    """Return a series interpolated at other times.  wraps: True for an angle that jumps at full turns."""
+    """Interpolate a series linearly at times (s), (n,).
+
+    wraps: True for an angle that jumps at full turns; the jumps are removed.
+    """
     known = np.isfinite(series.values)
     values = np.unwrap(series.values[known]) if wraps else series.values[known]
     return np.asarray(np.interp(time, series.time[known], values))
@@ -142,13 +153,13 @@ def _interpolate_at(series: Series, time: Floats, *, wraps: bool = False) -> Flo
 
 @dataclass(frozen=True, slots=True)
 class AirData:
-    """Airspeed and wind of a log; a series that the log lacks has no rows.
+    """Airspeed and wind in a log; a series that is unknown has no rows.
 
     airspeed: indicated airspeed, m/s, (n, 1).
     true_airspeed: true airspeed, m/s, (n, 1).
-    ratio: ratio of true to indicated airspeed, (n, 1); no rows if it is taken from the standard atmosphere.
+    ratio: ratio of true to indicated airspeed from logged pressure and temperature, (n, 1).
     wind: wind velocity to north and east, m/s, (n, 2).
-    wind_source: text on the source of the wind.
+    wind_source: description of the source of the wind.
     """
 
     airspeed: Samples
@@ -161,8 +172,9 @@ class AirData:
 def read_air(log: ColumnLog) -> AirData:
     """Read the airspeed and the wind of a log.
 
-    The ratio of true to indicated airspeed comes from static pressure and temperature if the table has both.  A log
-    without wind gets the wind of the triangle of ground velocity, heading and airspeed.
+    The ratio of true to indicated airspeed comes from static pressure and temperature if the table has both, otherwise
+    from the standard atmosphere at the logged altitude.  A wind that is not logged is estimated from ground velocity,
+    heading and airspeed.
     """
     ratio = NO_SAMPLES
     if log.has("static_pressure", "temperature"):
@@ -203,11 +215,10 @@ def read_air(log: ColumnLog) -> AirData:
 
 
 def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls, flags for the controls that are angles, and True if the aircraft has elevons.
+    """Read the fields `controls`, `angles` and `elevons` of `MotionLog`, where they are defined.
 
-    They become `controls`, `angles` and `elevons` of `MotionLog`, where they are defined.  Left and right halves become
-    one surface: the elevator is their mean, the aileron half their difference.  There are no rows if elevator, aileron
-    or throttle is missing.  A missing rudder is 0.
+    Left and right halves are combined to one surface.  There are no rows if elevator, aileron or throttle is missing.
+    A missing rudder is 0.
     """
     has_elevons = log.has("elevon_left", "elevon_right")
     elevator = _read_surface(
@@ -230,10 +241,13 @@ def _read_controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bo
 
 
 def _read_surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
-    """Return a surface's deflections and their unit, or None if the table lacks them.
+    """Read the deflections of a surface and their unit; None if the table lacks them.
 
-    They come from the surface's own column, or else from the columns of its left and right half: as their mean, or for
-    ailerons as half their difference.  Raises LogError if one half is an angle and the other a fraction.
+    They come from the surface's own column, or else from its left and right half.  Then they are the mean of both, or
+    for ailerons half of left minus right.  Raises LogError if one half is an angle and the other a fraction.
+
+    name: name of the surface.
+    halves: names of its left and right half; () if it has none.
     """
     if log.has(name):
         return log.series(name), log.unit(name)

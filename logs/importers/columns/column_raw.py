@@ -1,4 +1,4 @@
-"""Read a table of columns as an imported log, for `planfly import`."""
+"""Read a log with a table of columns into a `RawLog`, for `planfly import`."""
 
 import math
 from collections.abc import Iterator
@@ -21,11 +21,12 @@ _DATUMS: dict[str, VerticalDatum] = {"amsl": "amsl", "ellipsoid": "ellipsoid", "
 
 
 def read_columns(path: Path) -> RawLog:
-    """Read a log by its table of columns.
+    """Read a log with a table of columns into a `RawLog`.
 
-    path: a table of columns, or a data file with a table next to it.
+    Raises LogError for a file that cannot be read, a table without latitude or longitude, and quantities that
+    contradict each other.
 
-    Raises LogError for a file that cannot be read, and for a table without latitude or longitude.
+    path: path of the table, or of a data file with a table next to it.
     """
     log = ColumnLog(path)
     for quantity in ("latitude", "longitude"):
@@ -74,7 +75,7 @@ def read_columns(path: Path) -> RawLog:
 
 
 def _read_series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
-    """Yield the series of `logs.importers.raw_log.COLUMNS` that the table has, except the positions."""
+    """Yield the name and the data of each series of a `RawLog` that the log has, except the positions."""
     velocity = read_velocity(log)
     if len(velocity.time):
         yield "velocity", LogSeries("ground velocity", velocity.time, velocity.values[:, [1, 0, 2]] * [1.0, 1.0, -1.0])

@@ -1,4 +1,8 @@
-"""Read and check a table of columns (TOML): which column of which file holds each quantity of a flight."""
+"""Read and check a table of columns.
+
+It is a TOML file that states which column of which data file has each quantity.  Each class stands for one part of the
+file; square brackets show its place in the file.
+"""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,7 +15,7 @@ from world.errors import LogError
 from world.files import did_you_mean, read_small_file, toml_table
 from world.scenario_file import first_fault
 
-# Clock of columns that name no clock.
+# Name of the clock of columns that name no clock.
 MAIN_CLOCK = "main"
 _MAX_BYTES = 2**20
 
@@ -23,8 +27,8 @@ class _Table(BaseModel):
 class AlignTable(_Table):
     """[clocks.NAME.align]: two signals whose correlation gives the clock's offset from the main clock.
 
-    column: a column with this clock.
-    with: the quantity that varies with the column, on the main clock, or a column with the main clock.
+    column: column on this clock.
+    with: quantity that varies with the column, or column on the main clock that does.
     within_s: largest offset, s.
     """
 
@@ -34,7 +38,15 @@ class AlignTable(_Table):
 
 
 class ClockTable(_Table):
-    """[clocks.NAME]: column of times, or ``rate``, Hz, from which the times of the rows follow."""
+    """[clocks.NAME]: the times of the rows of a data file.
+
+    file: data file, relative to the table; None for the table's file.
+    column: column of times; None to compute the times from `rate`.
+    unit: unit of the column of times.
+    rate: rows per second.
+    offset_s: time to add to all times, s.
+    align: signals from which the offset from the main clock is found.
+    """
 
     file: str | None = None
     column: str | None = None
@@ -45,16 +57,22 @@ class ClockTable(_Table):
 
 
 class ConditionTable(_Table):
-    """Condition ``when`` of a column: only rows in which another column of its clock has this value."""
+    """The condition ``when`` of a column.
+
+    Only rows in which another column of its clock has this value are used.
+    """
 
     column: str
     value: float | str
 
 
 class ColumnTable(_Table):
-    """Entry of [columns]: a column, or a constant value, with unit, sign, frame and rate.
+    """An entry of [columns]: the column, or the constant value, of a quantity.
 
     The quantity is ``sign * (scale * column + offset)`` in ``unit`` and ``frame``.
+
+    rate: measurements per second, if fewer than rows; only rows in which the value changes are then used.
+    when: condition for the rows to use.
     """
 
     column: str | None = None
@@ -70,21 +88,25 @@ class ColumnTable(_Table):
 
     @model_validator(mode="after")
     def _check_source(self) -> "ColumnTable":
-        """Raise ValueError unless the entry has either a column or a constant."""
+        """Raise ValueError if the entry has neither a column nor a constant, or both."""
         if (self.column is None) == (self.value is None):
             raise ValueError("expected either `column`, the name of a column, or `value`, a constant")
         return self
 
 
 class ModesTable(_Table):
-    """[modes]: names of the values of `mode`, and the values in which the vehicle follows its mission."""
+    """[modes]: the flight modes.
+
+    names: names of the values of the quantity `mode`, keyed by value.
+    automatic: values of `mode` in which the vehicle follows its mission.
+    """
 
     names: dict[str, str] = {}
     automatic: list[float | str] = []
 
 
 def _as_list(entry: Any) -> Any:
-    """Return a single entry as a list of one entry."""
+    """Return a list unchanged, and any other entry as a list of one."""
     return entry if isinstance(entry, list) else [entry]
 
 
@@ -92,13 +114,17 @@ Entries = Annotated[list[ColumnTable], BeforeValidator(_as_list), Field(min_leng
 
 
 class LogTable(_Table):
-    """Table of columns of one flight log.
+    """The table of columns of one flight log.
 
-    file: the data file, relative to the table; a data file that is opened by its own name takes its place.
-    program: name of the program that flew: "ArduPlane V4.5.0".
+    file: data file, relative to the table; ignored if the log is opened by the name of another data file.
+    program: name of the program that flew, such as "ArduPlane V4.5.0".
     mission: mission file that the vehicle followed, relative to the table.
     parameter_columns: columns with names and values of the autopilot's parameters, in addition to [parameters].
-    span_s: first and last time on the main clock to read, s.
+    span_s: first and last time to read, on the main clock, s.
+    clocks: clocks, keyed by name.
+    columns: entries of each quantity, keyed by the name of the quantity.
+    modes: flight modes.
+    parameters: values of the autopilot's parameters, keyed by name.
     """
 
     file: str | None = None
@@ -113,7 +139,7 @@ class LogTable(_Table):
 
     @model_validator(mode="after")
     def _check_entries(self) -> "LogTable":
-        """Raise ValueError for an unknown quantity, unit, frame or clock, and for an impossible alignment."""
+        """Raise ValueError for an unknown quantity, unit, frame or clock, and for inconsistent entries."""
         for quantity, entries in self.columns.items():
             if quantity not in QUANTITIES:
                 known = did_you_mean(quantity, QUANTITIES) or f": expected one of {', '.join(QUANTITIES)}"
@@ -141,7 +167,10 @@ class LogTable(_Table):
 
 
 def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:
-    """Raise ValueError if a value is not one of the allowed values."""
+    """Raise ValueError if a value is not one of the allowed values.
+
+    field: key in the table, with which the message starts.
+    """
     choices = tuple(allowed)
     if value not in choices:
         expected = f"expected {', '.join(choices)}" if choices else "none is allowed here"
@@ -151,7 +180,8 @@ def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:
 def read_column_table(path: Path) -> LogTable:
     """Read and check a table of columns.
 
-    Raises LogError with the file, the key, the value and the allowed values.
+    Raises LogError for a file that cannot be read and for a wrong entry; the message states file, key, value and the
+    allowed values.
     """
     text = read_small_file(path, _MAX_BYTES, "table of columns", LogError)
     try:

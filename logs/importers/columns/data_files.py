@@ -1,4 +1,4 @@
-"""Read all columns of a CSV, MAT, Parquet or HDF5 file into arrays by name."""
+"""Read all columns of a CSV, MAT, Parquet or HDF5 file as arrays."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -26,11 +26,11 @@ _NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*|\s*(nan|i
 
 @dataclass(frozen=True, slots=True)
 class DataFile:
-    """Columns of a data file.
+    """The columns of a data file.
 
     path: the file.
-    columns: one-dimensional arrays by name, in the order of the file; their lengths may differ.
-    units: units by name, for a CSV file that states them in a row below its header.
+    columns: one-dimensional array of each column, keyed by name, in the order of the file; their lengths may differ.
+    units: unit of each column, keyed by name, if a CSV file states units in a row below its header.
     """
 
     path: Path
@@ -39,7 +39,10 @@ class DataFile:
 
 
 def read_data_file(path: Path) -> DataFile:
-    """Read a data file.  Raises LogError for a file that cannot be read or that has no rows."""
+    """Read a data file in the format that its suffix names.
+
+    Raises LogError for an unknown suffix, and for a file that cannot be read or has no rows.
+    """
     suffix = path.suffix.lower()
     readers: dict[str, Callable[[Path], DataFile]] = {
         ".csv": _read_csv,
@@ -58,7 +61,7 @@ def read_data_file(path: Path) -> DataFile:
         data = readers[suffix](path)
     except (LogError, MemoryError):
         raise
-    # Of any kind: a damaged file makes these libraries raise errors of struct, zlib, arrow, and plain ones.
+    # A damaged file makes these libraries raise errors of many kinds: of struct, zlib, arrow, and others.
     except Exception as error:
         reason = (str(error).splitlines() or [""])[0] or type(error).__name__
         raise LogError(f"{path}: cannot be read as a {suffix} file: {reason}", file=path) from error
@@ -72,9 +75,12 @@ def read_data_file(path: Path) -> DataFile:
 
 
 def _read_csv(path: Path) -> DataFile:
-    """Read a CSV file with a header line; remarks may come before it, and a line with units after it.
+    """Read a CSV file with a header line.
 
-    Raises LogError for a file without rows or without column names, and for two columns with the same name.
+    Remarks may precede the header, and a line with units may follow it.
+
+    Raises LogError for a file without rows or without column names, for two columns with the same name, and for rows
+    with another number of cells than the header.
     """
     import pandas as pd
 
@@ -134,7 +140,7 @@ def _read_csv(path: Path) -> DataFile:
 
 
 def _convert_numbers(values: Column) -> Column:
-    """Return numeric values as float64, and other values unchanged."""
+    """Convert integers, floats and booleans to float64; return other values unchanged."""
     return values.astype(np.float64) if values.dtype.kind in "fiub" else values
 
 
@@ -160,9 +166,13 @@ def _read_mat(path: Path) -> DataFile:
 
 
 def _list_mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
-    """Yield name and values of the columns of a MATLAB variable: a struct's fields or a matrix's columns.
+    """Yield the name and the values of each column of a MATLAB variable.
 
-    labels: names of a matrix's columns, if known.
+    Columns are the fields of a struct, also of nested structs, or the columns of a matrix.
+
+    name: name of the variable.
+    value: value of the variable, as loaded by scipy.
+    labels: names of a matrix's columns; None if unknown.
     """
     if hasattr(value, "_fieldnames"):
         for field_name in value._fieldnames:
@@ -178,10 +188,13 @@ def _list_mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tup
 
 
 def _list_array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
-    """Yield name and values of each column of an array; ignore arrays of more than two dimensions.
+    """Yield the name and the values of each column of an array.
 
-    An array of one dimension is one column.  The longer axis of a matrix is taken as its rows, unless the number of
-    titles shows which axis has the columns.
+    An array of more than two dimensions yields nothing.  A number or an array of one dimension is one column.  In a
+    matrix, rows are along the longer axis, unless the number of titles shows which axis has the columns.
+
+    name: name of the array, with which the names of a matrix's columns start.
+    titles: names of a matrix's columns; None or [] if unknown.
     """
     if array.ndim < 2:
         values = np.atleast_1d(array)
@@ -203,7 +216,7 @@ def _list_array_columns(name: str, array: Column, titles: list[str] | None = Non
 
 
 def _read_parquet(path: Path) -> DataFile:
-    """Read a Parquet file."""
+    """Read the columns of a Parquet file."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path)

@@ -13,7 +13,7 @@ TABLE_SUFFIX = ".columns.toml"
 
 
 def is_column_table_name(path: Path) -> bool:
-    """Return True if a file name is that of a table of columns: columns.toml or *.columns.toml.
+    """Return True if a path is named like a table of columns: columns.toml or *.columns.toml.
 
     >>> [is_column_table_name(Path(name)) for name in ("flight.columns.toml", "columns.toml", "scenario.toml")]
     [True, True, False]
@@ -22,9 +22,9 @@ def is_column_table_name(path: Path) -> bool:
 
 
 def find_column_table(path: Path) -> Path:
-    """Return the path of the table of columns for a data file: its own table, or the table of its folder.
+    """Return the path of a data file's table of columns: its own table, or else the table for its folder.
 
-    Raises LogError if there is neither.
+    Raises LogError if neither exists.
     """
     choices = (path.with_name(f"{path.stem}{TABLE_SUFFIX}"), path.with_name(FOLDER_TABLE))
     for choice in choices:

@@ -15,7 +15,7 @@ from logs.importers.columns.quantities import ANGLES, QUANTITIES, QUATERNION, UN
 from world.errors import LogError
 from world.wording import count_text
 
-# Names of columns by quantity, as only lower-case letters and digits; the first name that is found is used.
+# Usual names of the columns of each quantity, reduced to lower-case letters and digits; the best name first.
 NAMES: dict[str, tuple[str, ...]] = {
     "latitude": ("navlat", "lat", "latitude", "gpslat", "latitudedeg"),
     "longitude": ("navlon", "lon", "lng", "long", "longitude", "gpslon", "gpslng"),
@@ -84,7 +84,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "current": ("current", "curr", "amp", "amps", "ibat", "batterycurrent", "motorcurrent", "batcurrent"),
     "mode": ("flightmode", "modenum", "mode"),
 }
-# Names of columns of times.
+# Usual names of columns of times.
 _TIMES = (
     "time",
     "times",
@@ -98,7 +98,7 @@ _TIMES = (
     "motortime",
     "seconds",
 )
-# Quantities that a command needs, for the list of quantities that were not found.
+# Quantities that each command needs; those that were not found are listed in the table.
 _NEEDED = {
     "import": ("latitude", "longitude", "altitude"),
     "aircraft --identify": (
@@ -116,7 +116,7 @@ _NEEDED = {
         ),
     ),
 }
-# Units by their spellings at the end of a column's name, or in a row below the header.
+# Unit by its spelling at the end of a column's name, or in a row below the header.
 _SPELLINGS = {
     **{unit.lower(): unit for units in UNITS.values() for unit in units if unit not in ("", "iso", "fraction")},
     **{"degs": "deg/s", "dps": "deg/s", "rads": "rad/s", "mps": "m/s", "kts": "kt", "knots": "kt", "kmh": "km/h"},
@@ -139,7 +139,7 @@ _TRIED = {
 }
 # Range of usual intervals between rows, s.
 _STEPS_S = (0.001, 5.0)
-# Minimum median of some quantities in flight, which distinguishes their units.
+# Smallest median of some quantities in flight, which distinguishes their units.
 _LEAST_MEDIANS = {"acceleration_down": 4.0, "voltage": 2.5}
 # Highest voltage that is guessed, V.
 _HIGHEST_VOLTAGE_V = 130.0
@@ -155,14 +155,14 @@ _UNIT_SUFFIX = re.compile(r"(?:\s*[\[(]\s*([^\])]*)\s*[\])]|_([a-zA-Z%]+[0-9]?))
 
 @dataclass(frozen=True, slots=True)
 class _Clock:
-    """Column of times for a group of columns: the columns of one file with the same prefix and length.
+    """The column of times of a group of columns: all columns of one file with the same prefix and length.
 
     file: name of the file in the table.
     prefix: text before the last dot in the names of the columns, such as a message name.
     column: name of the column of times.
     unit: unit of the times.
     length: number of rows.
-    span: first and last time, s.
+    span: first and last time, s; (0, 0) for dates.
     """
 
     file: str
@@ -174,23 +174,20 @@ class _Clock:
 
     @property
     def group(self) -> tuple[str, str, int]:
-        """File, prefix and length of the columns with this clock."""
+        """File, prefix and length that the columns with this clock share."""
         return self.file, self.prefix, self.length
 
     def overlap(self, other: "_Clock") -> float:
-        """Return the duration that this clock has in common with another clock, s.
-
-        The duration is negative without a common time.
-        """
+        """Return the duration that this clock has in common with another clock, s; negative if there is none."""
         return min(self.span[1], other.span[1]) - max(self.span[0], other.span[0])
 
 
 @dataclass(frozen=True, slots=True)
 class _Guess:
-    """Guess that a column holds a quantity, for an entry of the table.
+    """A guess that a column has a quantity, in a unit and a frame.
 
-    clock: column of times of the guessed column.
-    reason: text that follows "guess" in the remark for the person who checks the entry; may be "".
+    clock: clock of the column.
+    reason: text after "guess" in the remark for the person who checks the entry; may be "".
     """
 
     quantity: str
@@ -202,12 +199,12 @@ class _Guess:
 
 
 def guess_column_table(paths: Sequence[Path], target: Path) -> str:
-    """Guess a table of columns for data files, and return its text (TOML).
-
-    paths: data files, the main file first.
-    target: path of the table, to which the files' paths in the text are relative.
+    """Guess a table of columns for data files, and return it as TOML text.
 
     Raises LogError for a file that cannot be read, and if no column was recognized.
+
+    paths: data files, the main file first.
+    target: path at which the table will be written; paths of data files in the table are relative to its folder.
     """
     file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
     files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
@@ -224,7 +221,7 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
                 all_clocks.append(_Clock(file, prefix, column, unit, len(values), span))
     clocks: list[_Clock] = []
     for clock in sorted(all_clocks, key=lambda clock: -clock.length):
-        # Of several columns of times in a group, use the one with the most time in common with the longest group.
+        # Of several columns of times in a group, use the column with the most time in common with the longest group.
         clocks_of_group = [
             other
             for other in all_clocks
@@ -236,7 +233,7 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     guesses: list[_Guess] = []
     alternatives: list[_Guess] = []
     for quantity in NAMES:
-        # A column with the rate of the sensors is preferred.
+        # A column on the first clock, which has the most rows, is preferred.
         candidates = sorted(_guess_entries(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
         guesses += candidates[:1]
         alternatives += [guess for guess in candidates[1:] if guess.clock != candidates[0].clock]
@@ -254,8 +251,8 @@ def _normalize_name(name: str) -> str:
 def _split_column_name(data: DataFile, column: str) -> tuple[str, str, str]:
     """Split a column's name into a prefix, a name and a unit.
 
-    The prefix is the text before the last dot, such as a message name.  The unit is stated by the file or by the end of
-    the name; it is "" if neither states one.
+    The prefix is the text before the last dot, such as a message name; "" without a dot.  The unit comes from the
+    file's row of units, or else from the end of the name; it is "" if neither states a known unit.
     """
     prefix, _, name = column.rpartition(".")
     unit = _SPELLINGS.get(data.units.get(column, "").strip().lower(), "")
@@ -267,11 +264,11 @@ def _split_column_name(data: DataFile, column: str) -> tuple[str, str, str]:
 
 
 def _find_time_unit(values: Column, stated_unit: str) -> str:
-    """Return the unit in which a column has increasing times at usual intervals.
+    """Return the unit in which a column has times that do not decrease, at usual intervals.
 
-    The unit is "iso" for dates with times of day.  Return "" if the column is not such a series of times.
+    It is "iso" for dates with times of day.  Return "" if the column is not such a series of times.
 
-    stated_unit: unit from the column's name or the file, or "".
+    stated_unit: unit that the column's name or the file states, else "".
     """
     if values.dtype.kind == "M":
         return "iso"
@@ -286,12 +283,12 @@ def _find_time_unit(values: Column, stated_unit: str) -> str:
 
 
 def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
-    """Yield a guess for each column whose name means a quantity and whose values are plausible.
+    """Yield a guess for each column that is named like a quantity and has plausible values.
 
-    The order is that of the quantity's names in `NAMES`.
+    Columns with better names, see `NAMES`, come first.
 
     clocks: clocks whose columns are examined.
-    files: data files by their names in the table.
+    files: data files, keyed by their name in the table.
     """
     for name in NAMES[quantity]:
         for clock in clocks:
@@ -310,12 +307,12 @@ def _guess_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, Dat
 
 
 def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stated_unit: str) -> _Guess | None:
-    """Guess in which unit and frame a column holds a quantity.
+    """Guess the unit and the frame of a column that may have a quantity.
 
-    Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.  A column for
-    `mode` may have any values.
+    Return None if the column is not numeric, is constant, or is implausible in every unit; a stated unit is accepted
+    without this test.  A column for the quantity `mode` may have any values.
 
-    stated_unit: unit from the column's name or the file, or "".
+    stated_unit: unit that the column's name or the file states, else "".
     """
     entry = QUANTITIES[quantity]
     if quantity == "mode":
@@ -352,9 +349,11 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
 
 
 def _format_table(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files: dict[str, DataFile]) -> str:
-    """Return the guessed table of columns as TOML, each guess with a remark.
+    """Return the guessed table of columns as TOML text, each guess with a remark.
 
-    alternatives: columns for the guessed quantities on other clocks, used to align these clocks with the main clock.
+    guesses: guess for each quantity.
+    alternatives: columns that have the same quantities on other clocks; these clocks are aligned by them.
+    files: data files, keyed by their name in the table; the main file first.
     """
     # The clock with the most guesses is the main clock.
     counts = Counter(guess.clock for guess in guesses)

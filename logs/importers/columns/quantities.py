@@ -1,4 +1,4 @@
-"""Define the quantities that a table of columns can name, with their units, frames and plausible ranges."""
+"""Define the quantities in a table of columns, with their units, frames and plausible ranges."""
 
 import math
 from typing import NamedTuple
@@ -20,19 +20,19 @@ UNITS: dict[str, dict[str, float]] = {
     "ratio": {"": 1.0},
     "mode": {"": 1.0},
 }
-# Value of a unit's zero in the base unit of its dimension; a throttle is idle at a pulse of 1000 us, full at 2000 us.
+# Value in the base unit at the zero of a unit; a throttle is idle (0) at a pulse of 1000 us, and full (1) at 2000 us.
 UNIT_ZEROS = {"K": -273.15, "us": -1.0}
 # Units of a deflection that state a fraction of full travel instead of an angle.
 FRACTION_UNITS = ("fraction", "%")
 
 
 class Quantity(NamedTuple):
-    """Quantity of a flight that a column can hold.
+    """A quantity of a flight that a table of columns can name.
 
-    dimension: key of `UNITS`.
-    meaning: sentence for the documentation, with the positive direction.
-    low, high: plausible range of almost all values in SI units and radians.
-    frames: allowed values of `frame`, the default first.
+    dimension: key of `UNITS`, which has the allowed units.
+    meaning: description for the documentation, with the positive direction.
+    low, high: plausible range of almost all values, in SI units and radians.
+    frames: allowed values of `frame`, the default first; () if the quantity has no frame.
     """
 
     dimension: str
@@ -116,7 +116,7 @@ QUANTITIES: dict[str, Quantity] = {
     "current": Quantity("current", "current from the battery", -50, 1000),
     "mode": Quantity("mode", "flight mode, a number or a text (`[modes]`)", -math.inf, math.inf),
 }
-# Angles of the attitude, and the parts of the quaternion that can take their place.
+# Angles of the attitude, and the components of the quaternion that can take their place.
 ANGLES = ("roll", "pitch", "yaw")
 QUATERNION = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 # Quantities that change their sign when they are converted from this frame to their default frame.
@@ -130,7 +130,7 @@ _NEGATED_BY_FRAME = {
 def to_default_frame(quantity: str, frame: str) -> tuple[float, float]:
     """Return the factor and the offset that convert a quantity from a frame to its default frame.
 
-    The offset is in SI units and rad.
+    The converted value is factor * value + offset, in SI units and radians.
 
     >>> to_default_frame("velocity_down", "ENU"), to_default_frame("velocity_down", "NED")
     ((-1.0, 0.0), (1.0, 0.0))
@@ -143,9 +143,12 @@ def to_default_frame(quantity: str, frame: str) -> tuple[float, float]:
 
 
 def find_likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
-    """Return another unit in which numbers of a quantity would be plausible, or "" without one.
+    """Return the first other unit in which the numbers of a quantity would be plausible.
 
-    magnitude: typical number in the data, which was read as a value in ``unit``.
+    Return "" if there is none.
+
+    unit: unit in which the numbers were read.
+    magnitude: size of a typical number in the data.
 
     >>> find_likelier_unit("roll", "rad", 179.0), find_likelier_unit("throttle", "fraction", 85.0)
     ('deg', '%')

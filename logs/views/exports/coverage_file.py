@@ -1,4 +1,4 @@
-"""Write the coverage of a radio link as a GeoTIFF."""
+"""Export the coverage of a radio link as a GeoTIFF."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ NO_MARGIN_DB = -9999.0
 
 
 def coverage_geotiff(coverage: LinkCoverage, origin: GeoOrigin) -> bytes:
-    """Return the bytes of a GeoTIFF of the link margin in every cell, dB.
+    """Encode the link margin of each cell of a coverage map, dB, as a GeoTIFF file.
 
-    Its projection is the azimuthal equidistant one about the origin of the map.  Cells whose ground is unknown or above
-    the aircraft have the value `NO_MARGIN_DB`.
+    Its projection is azimuthal equidistant, centred on `origin`.  Cells whose ground is unknown or above the aircraft
+    have the value `NO_MARGIN_DB`.
     """
     margin = np.where(np.isfinite(coverage.margin), coverage.margin, NO_MARGIN_DB).astype(np.float32)
     side, north = coverage.side, coverage.south + coverage.side * len(margin)

@@ -24,9 +24,10 @@ Columns = NDArray[Any]
 
 
 def make_flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
-    """Return the rows of a flight as columns (t,) by name: the fields of `/state`, latitude and longitude.
+    """Return the recorded quantities of a flight, each as a column (t,) keyed by its name.
 
-    Each name ends with its unit.  East, north and courses refer to the map projection centred on the scenario's origin.
+    They are the fields of the channel `/state`, and latitude and longitude.  Names end with the unit.  East, north and
+    courses refer to the map projection centred on the scenario's origin.
 
     >>> from logs.recording.example_log import example_log
     >>> columns = make_flight_columns(example_log())
@@ -44,9 +45,9 @@ def make_flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 
 
 def csv_text(log: FlightLog) -> str:
-    """Return the columns of a flight as CSV: a line of names, then one line per row.
+    """Return the columns of `make_flight_columns` as CSV text: a line of names, then one line per row.
 
-    Numbers have the fewest digits that reproduce the same value when they are read.
+    Numbers have the fewest digits from which the same value can be read back.
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
@@ -62,9 +63,10 @@ def csv_text(log: FlightLog) -> str:
 
 
 def parquet_bytes(log: FlightLog) -> bytes:
-    """Encode the columns of a flight as a Parquet file, with scenario name and origin as metadata.
+    """Encode the columns of `make_flight_columns` as a Parquet file.
 
-    Raises MissingExtraError without the extra ``tables``.
+    Its metadata are the scenario's name and origin, and how the flight ended.  Raises MissingExtraError if the extra
+    ``tables`` is not installed.
 
     >>> from logs.recording.example_log import example_log
     >>> parquet_bytes(example_log())[:4]
@@ -88,9 +90,10 @@ def parquet_bytes(log: FlightLog) -> bytes:
 
 
 def battery_voltage(log: FlightLog) -> float:
-    """Return the voltage of the aircraft's battery, which is constant in the model, V.
+    """Return the battery voltage of a flight, which is constant in the model, V.
 
-    If the aircraft does not state it, it is the mean that follows from logged energy and current; NaN without current.
+    If the aircraft does not define it, return the mean voltage: logged energy divided by logged charge.  NaN if no
+    charge was drawn.
 
     >>> from logs.recording.example_log import example_log
     >>> round(battery_voltage(example_log()), 3)  # 5 A and 180 W
@@ -133,7 +136,7 @@ _SLOW_INTERVAL_S = 0.1
 _LONG_INTERVAL_S = 1.0
 # Standard atmosphere: the ratio of air density to density at sea level is (1 - lapse h) ** power; 1/m.
 _DENSITY_LAPSE_PER_M = 2.25577e-5
-# Exponent of that formula.
+# The exponent, power, in the formula above.
 _DENSITY_EXPONENT = 4.2559
 
 
@@ -142,8 +145,8 @@ class _Topic(NamedTuple):
 
     name: name of the topic.
     period: interval of its messages, s; 0 for a message for each row.
-    fields: name, numpy type and, for an array, length of each field after the timestamp.
-    values: values of each field and of the timestamp, for the valid rows of the log.
+    fields: each field after the timestamp: its name, its numpy type and, for an array, its length.
+    values: values of the timestamp and of each field in all rows, keyed by field name.
     """
 
     name: str
@@ -153,7 +156,7 @@ class _Topic(NamedTuple):
 
 
 def px4_log_bytes(log: FlightLog) -> bytes:
-    r"""Encode a flight as a PX4 log (`.ulg`); rows without a position or an attitude are omitted.
+    r"""Encode a flight as a PX4 log file (`.ulg`); rows without a position or an attitude are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> px4_log_bytes(example_log())[:7]
@@ -206,7 +209,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 
 
 def _encode_message(letter: bytes, body: bytes) -> bytes:
-    """Encode one message of a ULog file: its length, the letter of its kind, and its content."""
+    """Encode one message of a ULog file: length of the content, letter of the type, and content."""
     return struct.pack("<H", len(body)) + letter + body
 
 
@@ -215,7 +218,7 @@ _VALIDITY_FIELDS = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global
 
 
 def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
-    """Make the ULog topics of some rows of a flight, in PX4's axes and units."""
+    """Make all ULog topics of a flight from the given rows of its track, in PX4's axes and units."""
     track, origin = log.track, log.setup.scenario.origin
     stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
     (east, north, up), (v_east, v_north, v_up) = track.position[rows].T, track.velocity[rows].T
@@ -227,7 +230,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     quaternions = compute_attitude_quaternion(track.attitude[rows])
 
     def make_topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
-        """Make a topic with the timestamps of all rows."""
+        """Make a topic with a value of each field, and the timestamp, for each row."""
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     topics = [
@@ -308,7 +311,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
 
 
 def _make_battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
-    """Return the values of PX4's topic battery_status at some rows, by field."""
+    """Return the fields of PX4's topic battery_status, each as its values in the given rows of the track."""
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As
@@ -321,10 +324,12 @@ def _make_battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, C
 
 
 def _make_mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
-    """Return the topic navigator_mission_item, with each item from the time at which it becomes active.
+    """Make the topic navigator_mission_item, with a message when each item becomes active.
 
     Items without a position get the time of the next item with a position, and the position 0, 0.  They are not
     omitted, because a gap in the numbers would look like lost items.
+
+    rows: indices of the track's rows to include.
     """
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
     legs, first_rows = np.unique(track.leg[rows], return_index=True)
@@ -367,9 +372,9 @@ def _make_mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
 
 
 def compute_attitude_quaternion(attitude: Any) -> Floats:
-    """Convert roll, pitch and yaw to quaternions (n, 4): w, x, y, z.
+    """Convert roll, pitch and yaw to quaternions w, x, y, z, (n, 4).
 
-    The quaternion rotates from forward, right, down to north, east, down.
+    They rotate from the axes forward, right, down to the axes north, east, down.
 
     attitude: roll, pitch and yaw, rad, (n, 3).
 

@@ -1,4 +1,4 @@
-"""Export plan and track for maps: KML (OGC 12-007) and GPX 1.1.
+"""Export plan, track, zones and simulated returns to launch for maps: KML (OGC 12-007) and GPX 1.1.
 
 GPX is written by gpxpy.  KML is written with the standard library, in 58 lines: simplekml 1.3.6 would save 30, but it
 continues element numbers from one document to the next, writes coordinates of points before altitudeMode (against OGC
@@ -35,14 +35,14 @@ POINT_INTERVAL_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class MapLine:
-    """A line on the map.
+    """A line in a map file.
 
     name: name of the line.
-    lat_deg, lon_deg: (n,) degrees.
-    amsl: (n,) m above mean sea level.
+    lat_deg, lon_deg: latitude and longitude of each point, degrees, (n,).
+    amsl: altitude of each point, m above mean sea level, (n,).
     marks: a name for each point, or empty.
-    folder: KML folder shared with other lines; "" for its own folder.
-    role: role in `logs.theme` that gives its style; "" for the viewer's default style.
+    folder: name of the KML folder that the line shares with others; "" for a folder of its own.
+    role: role in `logs.theme` that gives the line's style; "" for the viewer's default style.
     """
 
     name: str
@@ -55,7 +55,7 @@ class MapLine:
 
 
 def plan_line(setup: FlightSetup) -> MapLine:
-    """Return the route of a setup, with waypoints named by number and mission item as in a verdict.
+    """Return the planned route as a line whose points are named by waypoint and mission item.
 
     >>> from logs.recording.example_log import example_log
     >>> line = plan_line(example_log().setup)
@@ -69,7 +69,7 @@ def plan_line(setup: FlightSetup) -> MapLine:
 
 
 def track_line(setup: FlightSetup, track: Track) -> MapLine:
-    """Return the flown track as a line, with a point every `POINT_INTERVAL_S` seconds and at the end.
+    """Return the flown track as a line, with a point in every interval `POINT_INTERVAL_S` and at the end.
 
     Rows without a position are omitted.
 
@@ -90,13 +90,14 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
 
 @dataclass(frozen=True, slots=True)
 class MapZone:
-    """A zone on the map.
+    """A zone or another area in a map file.
 
-    name: name and kind of the zone.
-    parts: closed outline of each part, then its holes: (k, 2) latitude and longitude, degrees.
-    height: height of its ceiling, m; None without a ceiling.
-    above_ground: True if that height is above ground, not above mean sea level.
-    folder, role: as in `MapLine`.
+    name: name of the zone, with its kind.
+    parts: rings of each part: its outline, then its holes.  A ring is closed: latitude and longitude, degrees, (k, 2).
+    height: height of the zone's ceiling, m; None without a ceiling.
+    above_ground: True if `height` is above ground, False if it is above mean sea level.
+    folder: name of the KML folder that the zone shares with others.
+    role: role in `logs.theme` that gives the zone's style; "" for the viewer's default style.
     """
 
     name: str
@@ -108,7 +109,7 @@ class MapZone:
 
 
 def map_zones(setup: FlightSetup) -> list[MapZone]:
-    """Return the zones of a setup's scenario, and the zones of its mission's fence.
+    """Return the zones of the scenario and of the mission's fence, for a map file.
 
     >>> from logs.recording.example_log import example_log
     >>> map_zones(example_log().setup)
@@ -124,16 +125,16 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
     return zones
 
 
-# Returns and glides, in colours.
+# Simulated returns to launch and glides, in colours.
 
 
 def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> list[MapLine]:
-    """Return lines of a flight's returns and glides.
+    """Return map lines of a flight's simulated returns to launch and its glides.
 
-    They are the path coloured by the outcome of a return from each point, the paths of the worst returns, and the path
-    coloured by the destination that a glide reaches.
+    They are: the flight path, in segments coloured by the outcome of a return from there; the paths of the worst
+    returns; the flight path, in segments coloured by the destination that a glide from there reaches.
 
-    track: the flown track; None for returns from the planned path.
+    track: flown track; None if the returns start on the planned path.
     """
     limit, lines = drawn_returns.returns.limit, []
     for kind, segment in split_path_by_outcome(setup, drawn_returns, track):
@@ -152,9 +153,9 @@ def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
 
 
 def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str, role: str) -> MapLine:
-    """Make a line on the map from positions, m, (n, 3).
+    """Make a map line without named points from positions, m, (n, 3).
 
-    role: role of the data, which decides colour and width.
+    role: role in `logs.theme` that gives colour and width.
     """
     points = np.asarray(positions, dtype=np.float64)
     lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
@@ -162,16 +163,17 @@ def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str,
 
 
 def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZone]:
-    """Return the areas of the glide footprint; [] if none was computed.
+    """Return the areas of the glide footprint for a map file; [] if no footprint was computed.
 
-    There is an area for each height above ground from which a chosen place can be reached, and one of flat ground.
+    There is an area for each band of heights above ground: from there, a glide reaches home or another chosen place.
+    Another area is the flat ground on which a glide can end.
     """
     footprint = drawn_returns.glides.footprint
     if footprint is None:
         return []
 
     def make_shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
-        """Make an area on the map from outlines in m."""
+        """Make an area for a map file from parts, whose outlines are in m east and north of the origin."""
         geographic_parts = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in parts)
         return MapZone(name, geographic_parts, folder="the glide's footprint", role=role)
 
@@ -188,14 +190,15 @@ def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZon
 
 
 def _to_geographic(setup: FlightSetup, ring: Floats) -> Floats:
-    """Convert an outline (n, 2) in m to latitude and longitude, deg, (n, 2)."""
+    """Convert an outline from east and north, m, (n, 2), to latitude and longitude, degrees, (n, 2)."""
     return np.stack(to_geo(setup.scenario.origin, ring[:, 0], ring[:, 1]), axis=-1)
 
 
 def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
-    """Return a KML document with a folder for each line, and a placemark for each named point and zone.
+    """Return a KML document with a placemark for each line, each named point and each zone.
 
-    A zone is an outline on the ground, or a body up to its ceiling.
+    Placemarks are in the folder of their line or zone; a line without a folder gets its own.  A zone with a ceiling is
+    a body from the ground to the ceiling, otherwise an outline on the ground.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> text = kml_text("one leg", [line])
@@ -239,30 +242,30 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
 
 
 class _Folders:
-    """Folders of a KML document."""
+    """The folders of a KML document, added to it as they are needed."""
 
     def __init__(self, document: ElementTree.Element) -> None:
-        """Take the KML element to which folders are added."""
+        """Add the folders to `document`, the KML element Document."""
         self._document = document
         self._folder_by_name: dict[str, ElementTree.Element] = {}
 
     def add_folder(self, name: str) -> ElementTree.Element:
-        """Add a folder with a name to the document, and return the folder."""
+        """Add a new folder with this name to the document, and return its element."""
         folder = _add_element(self._document, "Folder")
         _add_element(folder, "name", name)
         return folder
 
     def shared_folder(self, name: str) -> ElementTree.Element:
-        """Return the folder that all lines and zones with this folder name share."""
+        """Return the element of the one shared folder with this name; it is added at the first call."""
         if name not in self._folder_by_name:
             self._folder_by_name[name] = self.add_folder(name)
         return self._folder_by_name[name]
 
 
 def _add_style(mark: ElementTree.Element, role: str) -> None:
-    """Add the colour and the width of a role, for the dark background of aerial pictures.
+    """Add the colour and the line width of a role to a placemark; nothing if `role` is "".
 
-    Nothing is added if `role` is "".
+    The colour is the one for dark backgrounds, because maps show aerial pictures.
     """
     if not role:
         return
@@ -276,10 +279,10 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
 
 
 def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:
-    """Add one closed outline to a polygon, at the height of the zone's ceiling.
+    """Add one closed ring to a polygon, at the height of the zone's ceiling, or at 0 without a ceiling.
 
-    kind: name of the outline's element, "outerBoundaryIs" or "innerBoundaryIs".
-    ring: latitude and longitude of its corners, deg, (k, 2).
+    kind: name of the ring's KML element, "outerBoundaryIs" or "innerBoundaryIs".
+    ring: latitude and longitude of its corners, degrees, (k, 2).
     """
     line = _add_element(_add_element(polygon, kind), "LinearRing")
     up = 0.0 if zone.height is None else zone.height
@@ -287,7 +290,7 @@ def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZo
 
 
 def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
-    """Add an element to a KML element, with the printable characters of a text."""
+    """Add a child element to a KML element, and return it; unprintable characters of its text are removed."""
     element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
     element.text = (
         "".join(character for character in text if character.isprintable() or character == " ") if text else None
@@ -296,14 +299,15 @@ def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> Elem
 
 
 def _format_coordinates(line: MapLine, index: int) -> str:
-    """Return longitude, latitude and altitude of a point in the syntax of KML."""
+    """Return a point of a line in KML syntax: longitude, latitude and altitude, separated by commas."""
     return f"{line.lon_deg[index]:.8f},{line.lat_deg[index]:.8f},{line.amsl[index]:.3f}"
 
 
 def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
     """Return a GPX document with lines and zones.
 
-    Lines with named points are routes; other lines and the outlines of zones are tracks.
+    Lines with named points become routes; other lines, and the outlines of zones, become tracks.  Points that are not
+    finite are omitted.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])

@@ -1,4 +1,4 @@
-"""Export the volumes of the ground risk as KML and GeoJSON (RFC 7946)."""
+"""Export the ground risk volumes of a flight as KML and GeoJSON (RFC 7946)."""
 
 import json
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from world.raster_file import longitude_near
 
 
 def risk_kml(setup: FlightSetup, volumes: Sequence[RiskVolume]) -> str:
-    """Return a KML document of the volumes and the route."""
+    """Return a KML document with the ground risk volumes and the planned route."""
     zones = [
         MapZone(
             volume.name,
@@ -32,11 +32,11 @@ def risk_kml(setup: FlightSetup, volumes: Sequence[RiskVolume]) -> str:
 
 
 def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: dict[str, Any]) -> str:
-    """Return a GeoJSON document with a feature for each volume.
-
-    properties: properties of each feature in addition to its name and its height above ground.
+    """Return a GeoJSON document with a feature for each ground risk volume.
 
     At the antimeridian, longitudes continue beyond 180 degrees, so that no area is split.
+
+    properties: properties that all features get in addition to their name and their height above ground.
     """
     features = [
         {
@@ -59,9 +59,9 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
 
 
 def _to_degrees(setup: FlightSetup, ring: Floats) -> Floats:
-    """Convert an outline (n, 2) in m to longitude and latitude, deg, (n, 2).
+    """Convert an outline from east and north, m, (n, 2), to longitude and latitude, degrees, (n, 2).
 
-    Longitudes near the origin continue beyond 180 degrees.
+    Longitudes do not jump at the antimeridian: they continue beyond 180 degrees.
     """
     origin = setup.scenario.origin
     lat, lon = to_geo(origin, ring[:, 0], ring[:, 1])

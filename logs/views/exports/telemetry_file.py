@@ -1,8 +1,8 @@
 """Write a flight as the telemetry log (`.tlog`) that a ground station would have recorded.
 
-The format is the one of Mission Planner, MAVProxy and pymavlink: before each MAVLink frame stands its time of arrival,
-microseconds since 1970 in eight bytes, big-endian.  The live vehicle sends the same frames at the same rates.  The
-clock of the log begins with the year 2000.
+Mission Planner, MAVProxy and pymavlink use this format: each MAVLink frame is preceded by its time of arrival in
+microseconds since 1970, as eight bytes, big-endian.  The live vehicle sends the same frames at the same rates.  The
+clock of the log starts at the beginning of the year 2000.
 """
 
 import itertools
@@ -34,11 +34,11 @@ from logs.recording.reader import FlightLog
 from logs.recording.state_channel import EPOCH_NS
 from logs.views.exports.log_files import battery_voltage
 
-# Time before each frame.
+# Format of the time before each frame.
 _STAMP = struct.Struct(">Q")
 # Interval of heartbeats, s.
 _HEARTBEAT_INTERVAL_S = 1.0
-# MAVLink severity by log level.
+# MAVLink severity of each log level.
 _SEVERITY = {"debug": INFO, "info": INFO, "warning": WARNING, "error": CRITICAL, "fatal": CRITICAL}
 # System and component of the vehicle.
 _VEHICLE = (1, mavlink.MAV_COMP_ID_AUTOPILOT1)
@@ -47,7 +47,7 @@ _STATION = (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
 
 def telemetry_bytes(log: FlightLog) -> bytes:
-    """Encode a flight as a telemetry log: mission upload, telemetry, reached waypoints, and event texts.
+    """Encode a flight as a telemetry log file: mission upload, telemetry, reached items, and event texts.
 
     >>> from logs.recording.example_log import example_log
     >>> data = telemetry_bytes(example_log())
@@ -73,7 +73,10 @@ def telemetry_bytes(log: FlightLog) -> bytes:
 
 
 def _make_flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
-    """Yield the time (s) and the message of each frame of the vehicle during the flight."""
+    """Yield each message that the vehicle sends during the flight, with its time, s.
+
+    The times do not decrease.
+    """
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
     start = snapshots.start_snapshot(setup)

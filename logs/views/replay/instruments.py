@@ -1,6 +1,6 @@
-"""Show the instruments of a recorded flight at one time, as lines of text for a terminal.
+"""Show the instruments of a recorded flight at one time as a frame: lines of text for a terminal.
 
-A frame depends only on log and time: the same log and time give the same lines, whatever the clock.
+A frame depends only on the log, the flight time and the width, not on the clock.
 """
 
 import bisect
@@ -16,19 +16,24 @@ from logs.views.charts import shorten
 from logs.views.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
 from world.arrays import Floats
 
-# Least width of a frame, columns.
+# Smallest width of a frame, columns.
 MIN_WIDTH = 60
-# Rows of the horizon; a frame and the line below it fit a terminal of 24 lines.
+# Rows of the horizon; a frame and the line below it fit into a terminal of 24 lines.
 _HORIZON_ROWS = 7
 
 # Pitch shown by a row of the horizon, degrees.
 _DEGREES_A_ROW = 5.0
-# Number of timeline entries at the bottom.
+# Number of timeline entries at the bottom of a frame.
 _LATEST_ENTRIES = 3
 
 
 class _Size(NamedTuple):
-    """Minimum columns of a frame of this size, columns of its horizon, and columns of a control's bar."""
+    """Widths of a frame and of its parts, columns.
+
+    columns: smallest width of a frame that uses this size.
+    horizon: width of the horizon without its edges.
+    bar: width of a control's bar without its ends.
+    """
 
     columns: int
     horizon: int
@@ -42,12 +47,12 @@ _NARROW = _Size(MIN_WIDTH, 11, 21)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instruments:
-    """Instruments of a recorded flight as frames of text, with its timeline and the ground below.
+    """The instruments of a recorded flight, which `frame` shows at any time; see `make_instruments`.
 
-    log: log with legs computed from its track.
+    log: log whose legs were computed from its track.
     entries: timeline of the flight.
-    ground: altitude of the ground under each row, m AMSL, (t,); NaN if unknown.
-    limits: name and limit of each control.
+    ground: altitude of the ground under each row of the track, m AMSL, (t,); NaN if unknown.
+    limits: name of each control and its greatest deflection in either direction, rad; 1 for the throttle.
     """
 
     log: FlightLog
@@ -56,11 +61,12 @@ class Instruments:
     limits: tuple[tuple[str, float], ...]
 
     def frame(self, time: float, *, width: int = 80) -> list[str]:
-        """Return the instruments as lines of text, for the last row at or before ``time`` (s).
+        """Return the frame at a time: the instruments as lines of text.
 
-        For a time before the first row, the first row is shown.
+        It shows the track's last row at or before that time, or the first row if there is none.
 
-        width: largest number of columns of a line; at least `MIN_WIDTH` are used.
+        time: flight time, s.
+        width: largest width of a line, columns; a smaller value than `MIN_WIDTH` is raised to it.
         """
         columns = max(MIN_WIDTH, width)
         log, track = self.log, self.log.track
@@ -113,7 +119,11 @@ class Instruments:
         return [shorten(line, columns).rstrip() for line in lines]
 
     def _draw_horizon(self, track_row: int, columns: int) -> list[str]:
-        """Return the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
+        """Draw the artificial horizon as lines: sky (blank) above, ground (:) below, the wings in the center.
+
+        track_row: index of the track's row.
+        columns: width of the horizon without its edges.
+        """
         roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[track_row])
         rows = []
         for row in range(_HORIZON_ROWS):
@@ -132,7 +142,10 @@ class Instruments:
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
     def _format_readouts(self, row: int) -> list[str]:
-        """Return the numbers next to the horizon: speeds, heights, attitude, path errors, wind and battery."""
+        """Return the lines next to the horizon: speeds, heights, attitude, path errors, wind and battery.
+
+        row: index of the track's row.
+        """
         track, setup = self.log.track, self.log.setup
         east, north, up = (float(value) for value in track.velocity[row])
         roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[row])
@@ -160,11 +173,12 @@ class Instruments:
         ]
 
     def _format_control_lines(self, row: int, bar_width: int) -> list[str]:
-        """Return one bar for each control, with its position (O) between its limits, and its command (|).
+        """Return a line for each control: a bar with its position (O) and its command (|) between its limits.
 
-        The bar of a control without a limit ends at 30°.
+        The bar of a surface without a limit ends at 30° on either side.
 
-        row: row of the track.  bar_width: number of characters.
+        row: index of the track's row.
+        bar_width: width of the bar, columns.
         """
         lines = []
         controls = self.log.track.controls[row].tolist()
@@ -190,9 +204,9 @@ class Instruments:
 
 
 def make_instruments(log: FlightLog) -> Instruments:
-    """Prepare the instruments of a log.
+    """Compute the legs, the timeline and the ground altitudes that the instruments of a log show.
 
-    The legs are computed from the track, not read from the log.
+    The legs are computed from the track; the recorded legs are not used.
 
     >>> from logs.recording.example_log import example_log
     >>> frame = make_instruments(example_log()).frame(10.0)
@@ -211,21 +225,24 @@ def make_instruments(log: FlightLog) -> Instruments:
 
 
 def _replace_control_characters(text: str) -> str:
-    """Replace unprintable characters with spaces, so that they cannot control the terminal."""
+    """Replace unprintable characters by spaces, so that a text cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _format_number(value: float, digits: int, sign: str = "") -> str:
-    """Return a number with fixed decimals; "?" if it is not finite."""
+    """Format a number with a fixed number of decimals; "?" if it is not finite.
+
+    sign: "+" to write a plus sign before positive numbers and zero.
+    """
     # Zero has no unwanted sign: "+0.0" or "0", never "-0".
     return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 
 def _format_metres(value: float) -> str:
-    """Return a length in whole metres with its unit."""
+    """Format a length in whole metres, with the unit; "? m" if it is not finite."""
     return f"{_format_number(value, 0)} m"
 
 
 def _format_course(degrees: float) -> str:
-    """Return a course with three digits; "?" if it is not finite."""
+    """Format a course as three digits from 000° to 359°; "?" if it is not finite."""
     return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

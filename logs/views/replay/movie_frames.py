@@ -1,6 +1,7 @@
-"""Render the frames of a movie of a flight: the map, the aircraft with its trail, and its numbers.
+"""Render the frames of a movie of a flight: the map, the aircraft and its trail, and numbers.
 
-The same log and rate give the same frames, whatever the clock.  The map is drawn once; a frame adds the moving parts.
+Frames depend only on the log and the speed of the movie, not on the clock.  The map is drawn once; each frame adds the
+moving parts.
 """
 
 import math
@@ -38,7 +39,10 @@ _MAX_TRAIL_POINTS = 4000
 
 @dataclass(frozen=True, slots=True)
 class MovieFrames:
-    """Frames of a flight from ``start`` to ``end`` (s), at ``speed`` times the speed of the flight.
+    """The frames of a movie of a flight, `RATE` a second.
+
+    start, end: flight time of the first and the last frame, s.
+    speed: speed of the movie as a multiple of the flight's.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -56,15 +60,18 @@ class MovieFrames:
     speed: float
 
     def __len__(self) -> int:
-        """Return the number of frames: the first shows the start, the last the end."""
+        """Return the number of frames, at least 2: the first shows the start, the last the end."""
         return max(1, math.ceil((self.end - self.start) * RATE / self.speed - 1e-9)) + 1
 
     def times(self) -> Floats:
-        """Return the flight time of each frame, s."""
+        """Return the flight time that each frame shows, s, (n,)."""
         return np.minimum(self.end, self.start + np.arange(len(self)) * self.speed / RATE)
 
     def frames(self) -> Iterator[Pixels]:
-        """Yield each frame as an array (height, width, 3), with even height and width for video formats."""
+        """Yield each frame as its red, green and blue pixels, (height, width, 3).
+
+        Height and width are even, as video formats require.
+        """
         setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
         figure = draw_map(
             flight_map(
@@ -93,10 +100,10 @@ class MovieFrames:
 
 
 class _MovingParts:
-    """Trail, aircraft and numbers, which move over the map."""
+    """The parts that each frame draws over the map: trail, aircraft, and a line of numbers."""
 
     def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
-        """Make the trail, the aircraft and the caption, which each frame draws again."""
+        """Add the moving parts to the axes of the map and to the figure; `show` draws them."""
         self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
         look: dict[str, Any] = {"animated": True, "zorder": 9}
         (self._trail,) = axes.plot([], [], color=theme.colour("flown"), linewidth=1.6, **look)
@@ -120,7 +127,7 @@ class _MovingParts:
         self._step = max(1, len(position) // _MAX_TRAIL_POINTS)
 
     def show(self, time: float) -> None:
-        """Draw the last row at or before ``time`` (s), and the trail up to it."""
+        """Draw trail, aircraft and numbers in the track's last row at or before a flight time, s."""
         track = self._track
         k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
         rows = np.append(np.arange(0, k, self._step), k)
@@ -147,9 +154,9 @@ class _MovingParts:
 
 
 def format_signed_number(value: float, digits: int) -> str:
-    """Return a number as text with ``digits`` decimals; "?" for a non-finite value.
+    """Format a number with a fixed number of decimals and a true minus sign; "?" if it is not finite.
 
-    Zero has no sign.
+    Zero and positive numbers have no sign.
 
     >>> format_signed_number(-0.3, 0), format_signed_number(-12.34, 1)
     ('0', '−12.3')

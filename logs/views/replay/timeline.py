@@ -1,7 +1,7 @@
-"""Timeline of a recorded flight: legs, turns, clearances, threats and events in order of time.
+"""List the timeline of a recorded flight: legs, turns, clearances, threats and events.
 
-Everything is recomputed from the track, the route, the terrain and the threats in the log; a recorded leg, clearance or
-verdict is not read.  Nothing is printed here.
+Legs and clearances are computed from the track, the route, the terrain and the threats in the log; recorded legs,
+clearances and verdicts are not used.
 """
 
 import itertools
@@ -19,19 +19,24 @@ from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 
-# Width of a line, columns.
+# Largest width of a line, columns.
 WIDTH = 100
 # The throttle is at a limit if it is within this tolerance of 0 or 1.
 _THROTTLE_LIMIT_TOLERANCE = 1e-3
-# Least duration of a throttle at its limit that gets an entry, s.
+# Shortest time of the throttle at a limit that gets an entry, s.
 _MIN_SATURATION_TIME_S = 2.0
-# Kinds of entries, in the order of entries at the same time.
+# Kinds of entries, in the order in which entries at the same time are listed.
 _ORDER = ("start", "turn", "leg", "ground", "threat", "throttle", "event", "end", "log")
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineEntry:
-    """One entry: time since the start (s), a kind ("leg", "turn", "threat", ...), and printable text."""
+    """One entry of a timeline.
+
+    time: flight time, s.
+    kind: subject of the entry, one of "start", "turn", "leg", "ground", "threat", "throttle", "event", "end", "log".
+    text: text of printable characters.
+    """
 
     time: float
     kind: str
@@ -40,7 +45,11 @@ class TimelineEntry:
 
 @dataclass(frozen=True, slots=True)
 class _LegRows:
-    """Rows first..last (both included) that were flown on one leg."""
+    """Successive rows of the track that were flown on one leg.
+
+    leg: index of the leg.
+    first, last: first and last row.
+    """
 
     leg: int
     first: int
@@ -48,7 +57,7 @@ class _LegRows:
 
 
 def timeline(log: FlightLog) -> list[TimelineEntry]:
-    """List the entries of a flight in order of time; the same log always gives the same entries.
+    """List the entries of a flight in order of time.
 
     >>> from logs.recording.example_log import example_log
     >>> for entry in timeline(example_log())[3:6]:
@@ -61,12 +70,12 @@ def timeline(log: FlightLog) -> list[TimelineEntry]:
 
 
 def log_with_legs(log: FlightLog) -> FlightLog:
-    """Return the log with legs computed from its track; recorded legs are not used."""
+    """Return the log with the recorded leg of each row replaced by the leg computed from the track."""
     return replace(log, track=with_legs(log.track, find_leg_ends(log.setup, log.track)))
 
 
 def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
-    """List the entries as `timeline` does, for a log whose legs `log_with_legs` has computed."""
+    """List the entries of a flight like `timeline`, for a log that `log_with_legs` returned."""
     # The rows are split where the leg changes; rows outside the legs of the route are left out.
     track = log.track
     edges = np.flatnonzero(np.diff(track.leg)) + 1
@@ -135,7 +144,7 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
 
 
 def entry_lines(entry: TimelineEntry) -> list[str]:
-    """Wrap an entry to lines of at most `WIDTH` columns that show time (s), kind and text.
+    """Format an entry as lines of at most `WIDTH` columns: time (s), kind, and the wrapped text.
 
     >>> entry_lines(TimelineEntry(20.0, "turn", "turn left 14.0° at waypoint 1"))
     ['    20.00 s  turn     turn left 14.0° at waypoint 1']
@@ -147,7 +156,10 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
 
 
 def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
-    """Group the parts of a flight: the parts of one loiter form a group, every other part its own group."""
+    """Group the parts of a flight: successive parts on legs of the same loiter together, all others alone.
+
+    parts: rows flown on each leg, in order of time.
+    """
     first_legs: list[int] = []
     for leg in range(route.legs):
         is_on_circle = min(route.arc_radii[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
@@ -159,16 +171,21 @@ def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]
 
 
 def waypoint_name(route: Route, index: int) -> str:
-    """Return the name of a waypoint: its number and, if it has one, its mission item."""
+    """Return the name of a waypoint: its stop number and, if it has one, its mission item.
+
+    index: index of the waypoint in the route.
+    """
     item = int(route.items[index])
     number = int(route.stops[index])
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
 
 
 def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List an entry for the start of each leg, with course, length, slope and airspeed.
+    """Make an entry for the start of each leg, with course, length, slope and airspeed.
 
-    A loiter has one entry for all its legs.
+    The legs around a loiter share one entry.
+
+    parts: rows flown on each leg, in order of time.
     """
     route = log.setup.route
     points = log.setup.display_waypoints
@@ -193,9 +210,12 @@ def _list_leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEnt
 
 
 def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List an entry for each change to the next leg: the turn of the route, and the peak bank.
+    """Make an entry for each change to the next leg: angle of the turn, and peak bank.
 
-    The peak bank is the largest bank between the middles of the two legs.  Corners within a loiter have no entries.
+    The angle is the one by which the route turns.  The peak bank is the largest bank between the middles of the two
+    legs.  Corners within a loiter have no entries.
+
+    parts: rows flown on each leg, in order of time.
     """
     route, track = log.setup.route, log.track
     turns = signed_turns(route.positions)
@@ -217,9 +237,12 @@ def _list_turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEn
 
 
 def _list_clearance_entries(log: FlightLog, rows_by_leg: list[_LegRows]) -> list[TimelineEntry]:
-    """List an entry for the lowest height above ground on each leg, which warns if the height is too low.
+    """Make an entry for the lowest height above ground on each leg.
 
-    The legs around one loiter have one entry together.  Without terrain there is a single entry that says so.
+    It says if this height is below the required clearance.  The legs around a loiter share one entry.  Without terrain,
+    the only entry says so.
+
+    rows_by_leg: rows flown on each leg, in order of time.
     """
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:

@@ -1,4 +1,4 @@
-"""Measure two flights alike from their logs alone, and compare them."""
+"""Compare two flights, judged and measured from their logs in the same way."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -45,7 +45,11 @@ from world.wording import NOTHING, format_number
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One quantity of both flights; NaN if a flight lacks it.  unit: "" for a number of items."""
+    """One quantity, as measured in both flights.
+
+    unit: unit of the quantity; "" for a number of items.
+    first, second: value in the first and in the second flight; NaN if unknown.
+    """
 
     name: str
     unit: str
@@ -55,11 +59,12 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Comparison:
-    """Two flights and their differences.
+    """The comparison of two flights.
 
-    logs, names, verdicts: of the first and the second flight.
-    differences: each measured quantity, whether it differs or not.
-    notes: differences of the setups, and the distance between the tracks, in sentences.
+    logs, names, verdicts: log, name and verdict of the first and the second flight.
+    differences: all measured quantities, also those that are equal.
+    notes: sentences on differences of the setups, on the distance between the tracks, and on limits that were missed
+        within their tolerance.
     """
 
     logs: tuple[FlightLog, FlightLog]
@@ -72,14 +77,14 @@ class Comparison:
         return f"<Comparison {' and '.join(self.names)}: {len(self.differences)} quantities, {len(self.notes)} notes>"
 
     def _repr_html_(self) -> str:
-        """Return the HTML for a notebook."""
+        """Return the table of differences as HTML for a notebook."""
         return html_table(" and ".join(self.names), difference_rows(self), ("", "", *self.names, "difference"))
 
 
 def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
     """Judge and measure the flights of two logs with the same rules, and list their differences.
 
-    names: names in tables and legends; "(first)" and "(second)" are added to equal names.
+    names: names of the flights in tables and legends; "(first)" and "(second)" are added if they are equal.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -115,13 +120,13 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 
 def _judge_log(log: FlightLog) -> Verdict:
-    """Judge the flight of a log."""
+    """Judge the flight recorded in a log."""
     end_reason = log.ended or "the log ends before the flight does"
     return judge_flight(log.setup, log.track, end_reason, log_complete=log.complete, reference=log.reference)
 
 
 def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
-    """Measure a flight; return its values by (name, unit), NaN if unknown."""
+    """Measure the quantities of a flight; return each value keyed by (name, unit), NaN if unknown."""
     has_position = np.isfinite(track.position).all(axis=1)
     position = np.ascontiguousarray(track.position[has_position])
     time = np.ascontiguousarray(track.time[has_position])
@@ -162,13 +167,13 @@ def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], f
 
 
 def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
-    """Apply a reduction, such as a mean or a maximum, to the finite values; NaN if there are none."""
+    """Apply a function such as `np.mean` or `np.max` to the finite values; return NaN if there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
 
 
 def _list_difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
-    """Return sentences on the differences between the setups, and on the distance between the tracks."""
+    """Return notes on differences of the setups, missing quantities, and the tracks' distance."""
     first_setup, second_setup = first.setup, second.setup
     notes = []
     for name, first_value, second_value in (
@@ -208,12 +213,13 @@ _BLOCK_POINTS = 32
 
 
 def measure_nearest_distances(points: Floats, track: Floats) -> Floats:
-    """Return the distance (n,) from each point of one track to the nearest point of another track.
+    """Return the distance from each point to the nearest point of a track, m, (n,).
 
-    To be fast, both tracks are divided into blocks of successive points.  For a block of ``points``, only those blocks
-    of ``track`` are searched whose bounding box is near enough to contain a nearest point.
+    To be fast, both are divided into blocks of successive points.  For each block of `points`, only those blocks of
+    `track` are searched whose bounding box is near enough to contain a nearest point.
 
-    points, track: (n, 3) and (m, 3).
+    points: points, m, (n, 3).
+    track: positions of the track, m, (m, 3).
 
     >>> points = np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]])
     >>> measure_nearest_distances(points, np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
@@ -237,7 +243,7 @@ def measure_nearest_distances(points: Floats, track: Floats) -> Floats:
 
 
 def _describe_wind(setup: FlightSetup) -> str:
-    """Return wind speed, direction and turbulence as text."""
+    """Return speed, direction and turbulence of a setup's wind as text."""
     wind = setup.scenario.wind
     direction_text = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
     forecast_text = "" if wind.forecast is None else f" (mean of {wind.forecast.describe()})"
@@ -245,10 +251,10 @@ def _describe_wind(setup: FlightSetup) -> str:
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return the rows of the table of differences as text.
+    """Return the rows of the table of differences, each as five texts.
 
-    The first row has both verdicts.  Each other row has the quantity, its unit, the values of both flights, and the
-    second value minus the first.
+    They are: quantity, unit, value in the first flight, value in the second flight, and second minus first value.  The
+    first row has the verdicts.
     """
     first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]
@@ -283,7 +289,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
 # ----------------------------------------------------------------------
 # The comparison of two flights as files: pictures, and a page that holds them.
 
-# Name of the chart of each picture, and its description.
+# Name of the page's chart, and description for readers who cannot see it, by file name of the picture.
 _PICTURES = {
     "compare-map": ("map", "Both flights from above, over the map of the first flight"),
     "compare-profile": (
@@ -296,8 +302,8 @@ _PICTURES = {
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
     """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder.
 
-    The folder is created if missing.  The map is omitted if the map origins of the flights differ.  Returns the paths
-    written.  Raises OSError.
+    The folder is created if missing.  The map is omitted if the map origins of the flights differ.  Return the paths of
+    the files.  Raises OSError if a file cannot be written.
 
     svg: True to write the pictures as SVG, too.
 
@@ -344,7 +350,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
 
 
 def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View]:
-    """Build the map and the chart of two flights, by file name; no map if their origins differ.
+    """Build the map and the chart of two flights, keyed by file name; no map if their map origins differ.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -358,9 +364,11 @@ def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View
 
 
 def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View]) -> dict[str, Any]:
-    """Return scene, flights and charts of the page as JSON data.
+    """Return the page's JSON data: "scene", "flight" and "charts".
 
-    The scene contains the ground of the map, and is None without a map.
+    The scene is data of a 3-D view, from which the page takes the ground of the map; it is None without a map.
+
+    views: views of `comparison_views`.
     """
     first, _ = flights
     scene = None

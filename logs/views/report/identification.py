@@ -28,12 +28,15 @@ _INTERVAL_SIGMAS = 1.96
 
 @dataclass(frozen=True, slots=True)
 class IdentificationFacts:
-    """Data of the page.
+    """Data that the page of an identification shows.
 
-    title: title of the aircraft.  logs: name and SHA-256 of each log.
-    numbers: performance of the aircraft: name, unit, lower end, estimate and upper end (95 %).
-    predicted: predictions of the check log, or of the logs themselves.  check: file of the check log; None without one.
-    wide: numbers that the logs leave uncertain, with the flights that would narrow each, a line each.
+    title: title of the aircraft.
+    estimate: identified parameters and fits.
+    logs: name and SHA-256 of each log.
+    numbers: performance numbers of the aircraft: name, unit, lower end of the 95 % interval, estimate, and upper end.
+    predicted: predictions of the check log, or of the logs themselves without a check log.
+    check: file name of the check log; None without one.
+    wide: for each performance number that the logs leave uncertain, a line with the flights that would narrow it.
     """
 
     title: str
@@ -46,7 +49,11 @@ class IdentificationFacts:
 
 
 class ParameterRow(NamedTuple):
-    """A row of the table, as text; share: contribution of the logs to the interval, percent."""
+    """A row of the table of parameters, as text.
+
+    low, high: ends of the 95 % interval.
+    share: part of the prior's variance that the logs remove, percent.
+    """
 
     title: str
     name: str
@@ -58,7 +65,7 @@ class ParameterRow(NamedTuple):
 
 
 def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
-    """Return a row for every parameter: its prior, its estimate and its 95 % interval."""
+    """Return a row for each parameter, with its prior, its estimate and its 95 % interval."""
     shares = np.round(100.0 * estimate.log_fractions()).astype(int).tolist()
     rows = []
     for parameter, value, sd, share in zip(
@@ -79,9 +86,10 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
 
 
 def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
-    """Return a row for each fixed quantity: its name, and the parameters that depend most on it.
+    """Return a row for each quantity that the identification keeps fixed: name and influence.
 
-    The row states the change of these `count` parameters for a change of the quantity by one standard deviation.
+    The text lists the `count` parameters that change most if the quantity changes by one standard deviation, with their
+    changes.
     """
     rows = []
     sds = np.array([parameter.sd for parameter in PARAMETERS])
@@ -93,9 +101,9 @@ def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
 
 
 def prediction_rows(predicted: PredictedLog) -> list[tuple[str, str, list[str]]]:
-    """Return a row for each quantity and time ahead, as text.
+    """Return a row for each predicted quantity and each time ahead, as text.
 
-    A row is the quantity with its unit, the time ahead, and the root mean square error of each model.
+    It contains the quantity with its unit, the time ahead, and the root mean square prediction error of each model.
     """
     return [
         (

@@ -1,8 +1,8 @@
 """Write the report of a flight: one self-contained HTML page, and its pictures as files.
 
-The page contains its data, style and two scripts (its own and plotly.js), which its policy lists by hash; it makes no
-network requests.  It prints its charts and its 3-D view as they are drawn.  Without scripts it shows the map and the
-profile as pictures.
+The page contains its data, its style and two scripts (its own and plotly.js), and makes no network requests.  Its
+content security policy lists the scripts by hash.  Print shows the charts and the 3-D view as they are on the screen.
+In browsers without scripts, the page shows the map and the profile as pictures.
 """
 
 import base64
@@ -36,7 +36,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
 from logs.views import figures
 from logs.views.charts import Chart
-from logs.views.failures import failures
+from logs.views.failures import collect_failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, make_subject, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
@@ -57,13 +57,13 @@ _LARGE_PICTURE_BYTES = 200_000
 
 @dataclass(frozen=True, slots=True)
 class ReportPicture:
-    """One picture of the page.
+    """One figure of the page.
 
-    identifier: identifier of its section.
+    identifier: identifier of its section in the HTML.
     title: its heading.
-    alternative: text for readers who cannot see it.
-    caption: explanation of the picture.
-    data: the still picture as a data URL; "" if the figure has none.
+    alternative: description for readers who cannot see it.
+    caption: explanation below the figure.
+    data: still picture of the figure as a data URL; "" for none.
     """
 
     identifier: str
@@ -74,9 +74,10 @@ class ReportPicture:
 
 
 def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[str, bytes]) -> list[ReportPicture]:
-    """List the pictures of the figures with these names, in the order of the page.
+    """Return the figures with these names for the page's template, in the order of the page.
 
-    stills: PNG bytes of still pictures, by file name.
+    names: names of figures in `FIGURES`.
+    stills: PNG bytes of still pictures, keyed by file name.
     """
     return [
         ReportPicture(
@@ -92,23 +93,21 @@ def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[st
 
 
 def picture_data_url(png: bytes) -> str:
-    """Return a picture as a data URL.
-
-    A large picture, which is shown only in print, is converted to a JPEG.
+    """Convert the bytes of a PNG to a data URL; a large PNG is converted to a JPEG first.
 
     >>> picture_data_url(b"PNG")
     'data:image/png;base64,UE5H'
     """
-    # Imported here, so that matplotlib is not loaded before a drawing.
+    # Imported here, so that matplotlib is loaded only if something is drawn.
     from logs.views.drawing import jpeg_bytes
 
     kind, data = ("png", png) if len(png) <= _LARGE_PICTURE_BYTES else ("jpeg", jpeg_bytes(png))
     return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
 
 
-# Style, scripts and plotly.js of the pages, and the policy that admits no others.
+# Style, scripts and plotly.js of the pages, and their hashes for the content security policy.
 
-# Scripts in the order of the page; the comparison has charts but no 3-D view.
+# Scripts of pages with charts, in the order of the page.
 CHART_SCRIPTS = (
     "page_data",
     "theme",
@@ -122,6 +121,7 @@ CHART_SCRIPTS = (
     "charts",
     "folds",
 )
+# Scripts that pages with a 3-D view add to them.
 VIEW_SCRIPTS = (
     "moments",
     "clock",
@@ -141,7 +141,7 @@ class PageLibrary:
     """plotly.js as embedded in a page.
 
     packed: the script, compressed with gzip and encoded in base64.
-    digest: hash of the script in the form of a policy.
+    digest: hash of the script, as `script_digest` returns it.
     version: version of plotly.js.
     """
 
@@ -152,7 +152,10 @@ class PageLibrary:
 
 @cache
 def _load_templates(package: str) -> Environment:
-    """Load the page's templates; an undefined name in a template is an error."""
+    """Return a Jinja environment for a package's folder ``templates``.
+
+    An undefined name in a template is an error.
+    """
     return Environment(
         loader=PackageLoader(package),
         autoescape=True,
@@ -163,17 +166,19 @@ def _load_templates(package: str) -> Environment:
 
 
 def page_template(name: str, package: str = "logs.views.report") -> Template:
-    """Return a template of a package's folder ``templates``, compiled once in a process.
+    """Return a template from the folder ``templates`` of a package.
 
-    Rendered values are escaped, and a missing name is an error.
+    It is compiled once in a process.  It escapes the values that it renders, and raises an error for a missing value.
+
+    name: file name of the template.
     """
     return _load_templates(package).get_template(name)
 
 
 def script_text(names: tuple[str, ...]) -> str:
-    """Join the theme's styles and scripts of ``templates/scripts`` into one script.
+    """Join the styles of the theme and scripts from ``templates/scripts`` into one script.
 
-    names: names of the scripts, in order; the script ``start`` is added at the end.
+    names: names of the scripts, in order; the script ``start``, which starts the page, is added at the end.
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
@@ -182,16 +187,17 @@ def script_text(names: tuple[str, ...]) -> str:
 
 
 def style_text(*names: str) -> str:
-    """Join the theme's colours and the style sheets of ``templates`` with these names."""
+    """Join the theme's colours and style sheets from ``templates`` into one style sheet.
+
+    names: names of the style sheets, in order.
+    """
     files = resources.files("logs.views.report").joinpath("templates")
     sheets = [files.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in names]
     return "\n".join([theme.css_variables(), *sheets])
 
 
 def script_digest(text: str) -> str:
-    """Return the hash of a script as a content security policy states it.
-
-    The form is that of Content Security Policy Level 3, "hash-source".
+    """Return the hash of a script in the form "hash-source" of Content Security Policy Level 3.
 
     >>> script_digest("")
     'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='
@@ -201,9 +207,9 @@ def script_digest(text: str) -> str:
 
 @cache
 def page_library() -> PageLibrary:
-    """Return plotly.js as compressed by the build, to a third of its original size.
+    """Return plotly.js from the compressed file that the build of the package makes.
 
-    Raises OSError if the build is missing.
+    Raises OSError if the file is missing.
     """
     packed = resources.files("logs.views.report").joinpath("plotly.min.js.gz").read_bytes()
     text = gzip.decompress(packed).decode("utf-8")
@@ -228,17 +234,17 @@ def write_report(
 ) -> list[Path]:
     """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, created if missing.
 
-    track: None for a plan that was not flown.
-    ended: how the flight ended, as in its log; None if unknown.
-    versions: versions of planfly and the packages it depends on.
-    command: the command line that repeats the flight.
-    events: lines of the log, shown with their times.
-    every_picture: True to write every figure of `logs.views.figures.FIGURES` as PNG.
-    svg: True to write the same figures as SVG, too.
-    returns: returns of the flight or the plan; None to draw none.
+    Everything is drawn before the first file is written; each file is written completely or not at all.  Return the
+    paths of the files.  Raises OSError if a file cannot be written.
 
-    Everything is drawn before the first file is written; each file is written whole or not at all.
-    Returns the paths written.  Raises OSError.
+    track: flown track; None for a plan that was not flown.
+    ended: reason why the flight ended, as in its log; None if unknown.
+    versions: versions of planfly and of the packages it depends on, keyed by name.
+    command: command line that repeats the flight.
+    events: events in the log, shown with their times.
+    every_picture: True to write all figures of `logs.views.figures.FIGURES` as PNG, False for only map and profile.
+    svg: True to write the same figures as SVG, too.
+    returns: judged returns to launch of the flight or the plan; None to draw none.
 
     >>> import tempfile
     >>> from logs.recording.example_log import example_log
@@ -277,16 +283,15 @@ def _render_page(
     command: str,
     events: Sequence["LogEvent"] = (),
 ) -> str:
-    """Return the report's page: the template filled with verdict, tables, pictures and facts.
+    """Return the HTML of the report: the template filled with verdict, tables, charts and facts.
 
-    subject: the track, if any, and its verdict.
-    views: interactive charts by name.  pictures: PNG files by name.
-    end_reason: reason why the flight ended; None for a plan.
-    versions: versions of planfly and of its libraries by name.
-    command: the command line that repeats the flight.
+    subject: track, if any, and verdict.
+    views: views of all figures, keyed by figure name.
+    pictures: PNG bytes of the still pictures, keyed by file name.
+    end_reason, versions, command, events: as in `write_report`, where `end_reason` is `ended`.
     """
     track, verdict = subject.track, subject.verdict
-    failed = failures(verdict, len(setup.route.points))
+    failed = collect_failures(verdict, len(setup.route.points))
     charts, flight = page_charts(views), report_flight(setup, track)
     shown_pictures = report_pictures(subject, charts, pictures)
     scene = charts.pop("scene")
@@ -341,14 +346,17 @@ def _render_page(
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the figures that the scripts draw as JSON data, by name; charts without panels are omitted."""
+    """Convert views to JSON data for the page's scripts, keyed by figure name.
+
+    Charts without panels are omitted.
+    """
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 
 def report_flight(setup: FlightSetup, track: Track | None) -> dict[str, Any]:
-    """Return the flight's moments for slider and map, and the aircraft model, for the page.
+    """Return the page's JSON data on the flight: its moments, for slider and map, and the aircraft model.
 
-    A plan that was not flown has no moments.
+    A plan that was not flown, and a flight without a known position, has no moments.
     """
     flights = [] if track is None else [flight_moments(setup, track)]
     # A flight without a known position cannot be shown.

@@ -22,7 +22,8 @@ from logs.views.scene import script_json
 def prediction_page(heading: str, bands: Sequence[Band], chart: Chart) -> str:
     """Return the page of a blind prediction as self-contained HTML, with picture, chart and scripts.
 
-    heading: description of the prediction in a sentence.
+    heading: sentence that describes the prediction.
+    chart: chart of the bands, as returned by `band_chart`.
     """
     script = script_text(CHART_SCRIPTS)
     return page_template("prediction.html").render(

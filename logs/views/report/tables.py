@@ -25,13 +25,17 @@ if TYPE_CHECKING:
 
 Facts = list[tuple[str, str]]
 
-# Largest number of events in a page that a reader can be expected to read.
+# Largest number of events that a page lists.
 MAX_EVENTS = 200
 
 
 @dataclass(frozen=True, slots=True)
 class LegRow:
-    """One leg as text, in the columns of `LEG_COLUMNS`; failing: True if a finding on the leg failed."""
+    """A row of the table of legs.
+
+    cells: texts in the columns of `LEG_COLUMNS`.
+    failing: True if a finding on the leg failed.
+    """
 
     cells: tuple[str, ...]
     failing: bool
@@ -56,9 +60,10 @@ LEG_COLUMNS = (
 
 
 def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -> list[LegRow]:
-    """List the legs of the route, with their planned shape and flown values.
+    """Return a row for each leg of the route, with its planned shape and its flown values.
 
-    failing: numbers of the legs with a failed finding.
+    track: flown track; None for a plan, whose cells of flown values contain `NOTHING`.
+    failing: indices of the legs with a failed finding.
     """
     waypoints = setup.display_waypoints
     runs = leg_runs(waypoints)
@@ -102,9 +107,10 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
 
 
 def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
-    """Return the lowest height above ground from each row to the next, m, (t,).
+    """Return the lowest height above ground between each row of a track and the next, m, (t,).
 
-    The heights are measured as by the clearance rule.  The last row has its own height.  Return None without terrain.
+    It is measured in the same way as by the clearance rule.  The last value is the height of the last row.  Return None
+    without terrain.
     """
     terrain = setup.scenario.terrain
     if terrain is None:
@@ -114,7 +120,10 @@ def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
 
 
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
-    """Return one sentence on the flight: distance, time, lowest height and energy; "" for a plan."""
+    """Return a sentence on distance, time, lowest height above ground and energy of a flight.
+
+    Return "" without a track.
+    """
     if track is None:
         return ""
     seconds = float(track.time[-1] - track.time[0])
@@ -158,7 +167,7 @@ def _find_min_finite(values: Floats) -> float:
 
 
 def scenario_facts(setup: FlightSetup) -> Facts:
-    """Return facts on the scenario: area, terrain, threats, limits, wind."""
+    """Return names and texts of facts on the scenario: area, terrain, threats, limits and wind."""
     scenario = setup.scenario
     terrain = scenario.terrain
     facts: Facts = [("Scenario", scenario.name)]
@@ -219,13 +228,16 @@ def scenario_facts(setup: FlightSetup) -> Facts:
 
 
 def _format_position(lat_deg: float, lon_deg: float) -> str:
-    """Return latitude and longitude as text, in degrees."""
+    """Format a position as degrees of latitude, N or S, and of longitude, E or W."""
     ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
     return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
 
 
 def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
-    """Return facts on aircraft, mission, route and plan."""
+    """Return names and texts of facts on aircraft, mission, route, plan and end of the flight.
+
+    end_reason: reason why the flight ended; "" to leave it out.
+    """
     bank = min(setup.max_bank, setup.envelope.max_bank)
     braking_text = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
     route = setup.route
@@ -258,19 +270,20 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
 
 
 def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
-    """List the first `MAX_EVENTS` events as time (s), text and level."""
+    """Return a row for each of the first `MAX_EVENTS` events: time (s), text and level."""
     return [(format_number(event.time, digits=2), event.text, event.level) for event in events[:MAX_EVENTS]]
 
 
 def mission_notes(setup: FlightSetup) -> list[str]:
-    """List warnings on the mission file, and notes on the scenario and on items that cannot be flown."""
+    """Return warnings about the mission file, and notes on the scenario and on items that cannot be flown."""
     return [*setup.mission.warnings, *setup.scenario.notes, *setup.notes]
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Return facts on the energy drawn from the battery, except the amount that `flight_sentence` states.
+    """Return facts on the battery: energy left, peak current, mean power, energy per kilometre.
 
-    Return [] without a track, or if its energy is unknown.
+    Each fact is a name and a text.  The energy used is part of `flight_sentence`.  Return [] without a track, or if its
+    energy is unknown.
     """
     if track is None or len(track) == 0:
         return []
@@ -295,7 +308,7 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
 
 
 def reproducibility_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
-    """Return the seed, versions and hashes that are needed to reproduce the flight."""
+    """Return names and texts of the seed, versions and hashes that are needed to reproduce the flight."""
     wind_seed = setup.scenario.wind.seed
     facts: Facts = [("Seed", f"{setup.seed}" + (f"; turbulence {wind_seed}" if wind_seed is not None else ""))]
     facts += [(name, versions[name]) for name in sorted(versions)]
@@ -313,9 +326,9 @@ PASSAGE_COLUMNS = ("unit", "reach", "entered (s)", "left (s)", "inside (s)", "cl
 
 
 def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """List the stays inside the spheres of missiles and radars in order of time.
+    """Return a row for each stay inside the sphere of a missile or radar, in order of time.
 
-    Each row has the columns of `PASSAGE_COLUMNS`.
+    Return [] without a track.  Rows have the columns of `PASSAGE_COLUMNS`.
     """
     if track is None or len(track) == 0:
         return []
@@ -341,9 +354,10 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
 
 
 def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """List each control with its limit, its largest command, and its time at the limit (s, %).
+    """Return a row for each control: name, limit, largest command, and time at the limit (s, %).
 
-    Return [] for a track of fewer than two rows.  The cells of an unknown limit contain `NOTHING`.
+    Return [] without a track or for fewer than two rows.  The cells that an unknown limit leaves open contain
+    `NOTHING`.
     """
     if track is None or len(track) < 2:
         return []

@@ -17,7 +17,7 @@ _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)"
 
 
 def refly_lines(reflight: Reflight) -> list[str]:
-    """Return tables of legs and turns, as flown and as simulated, and a line on how well the model fits.
+    """Return tables of legs and turns, as flown and as simulated, and the fit of the model, as lines.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -49,7 +49,7 @@ def refly_lines(reflight: Reflight) -> list[str]:
 
 
 def describe_model_trust(reflight: Reflight) -> str:
-    """Return one line on how well the model represents the aircraft of an imported flight."""
+    """Return a line on how far an imported flight differs from its simulation by a model."""
     model = reflight.setup.aircraft
     model_text = f"{model}, used because no aircraft was named," if reflight.stands_in else model
     if not reflight.spreads:
@@ -68,10 +68,12 @@ def describe_model_trust(reflight: Reflight) -> str:
 
 
 def list_not_reflown(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:
-    """List the stretches of an imported flight that were not simulated, with the reasons.
+    """Return a line for each stretch of an imported flight that was not simulated, with the reason.
 
-    reflights: simulated flights, each with its stretch.
-    stretches: all stretches of the imported flight, which are the periods in which it followed its mission.
+    A stretch is a period in which the flight followed its mission.
+
+    reflights: simulations, each of one stretch.
+    stretches: all stretches of the imported flight.
     max_count: largest number of stretches that are simulated.
 
     >>> list_not_reflown((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
@@ -90,12 +92,15 @@ def list_not_reflown(reflights: Sequence[Reflight], stretches: Sequence[MissionS
 
 
 def _format_pair(pair: tuple[float, float]) -> str:
-    """Return a flown and a simulated value as text; "-" for an unknown one."""
+    """Format a flown and a simulated value as "flown / simulated", with "-" for NaN."""
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 
 def format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Align the cells of a table: the first column left, all others right."""
+    """Return a line for each row of a table, with the first column aligned left and all others right.
+
+    rows: cells of each row; all rows have the same number of cells.
+    """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first_cell, *cells in rows:

@@ -16,7 +16,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
-from logs.views.failures import failures
+from logs.views.failures import collect_failures
 from logs.views.turns import list_place_values
 from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
@@ -66,7 +66,7 @@ def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [list_place_values(verdict.findings, rule) for rule in RULES]
     return [
-        failures(verdict, len(setup.route.points)),
+        collect_failures(verdict, len(setup.route.points)),
         values,
         rows,
         (shown.state, shown.title),

@@ -7,12 +7,21 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logs.views.charts import Chart, Layer, Panel, chart_json, find_outline_rows, nice_step, numbers, screen_decimals
+from logs.views.charts import (
+    Chart,
+    Layer,
+    Panel,
+    chart_json,
+    find_outline_rows,
+    json_numbers,
+    nice_step,
+    screen_decimals,
+)
 
 
 def test_numbers_are_rounded_and_what_is_none_is_null() -> None:
-    assert numbers([1.26, -0.04, math.nan, math.inf], 1) == [1.3, 0.0, None, None]
-    assert math.copysign(1.0, numbers([-0.04], 1)[0] or 0.0) == 1.0
+    assert json_numbers([1.26, -0.04, math.nan, math.inf], 1) == [1.3, 0.0, None, None]
+    assert math.copysign(1.0, json_numbers([-0.04], 1)[0] or 0.0) == 1.0
 
 
 def test_digits_show_a_ten_thousandth_of_the_range() -> None:

@@ -13,7 +13,7 @@ from logs.verdict.places import Place
 from logs.views.drawing import new_figure
 from logs.views.failures import (
     Failures,
-    failures,
+    collect_failures,
     find_rows_inside_threats,
     make_fail_labels,
     paths_differ,
@@ -157,10 +157,10 @@ def test_paths_that_lie_on_each_other_do_not_differ() -> None:
 
 def test_failures_are_found_at_their_legs_and_waypoints() -> None:
     bad = ("slope", Place("leg", 1)), ("clearance", Place("leg", 1)), ("turn", Place("waypoint", 3, 7))
-    found = failures(make_verdict(*bad), 4)
+    found = collect_failures(make_verdict(*bad), 4)
     assert found.legs == {1: ("slope", "clearance")}
     assert found.waypoints == {3: ("turn",)}
-    assert not failures(make_verdict(("slope", Place("leg", 3)), ("turn", Place("waypoint", 4))), 4)
+    assert not collect_failures(make_verdict(("slope", Place("leg", 3)), ("turn", Place("waypoint", 4))), 4)
 
 
 # ----------------------------------------------------------------------
@@ -226,10 +226,10 @@ def test_a_sphere_is_the_one_that_the_place_names() -> None:
     assert threat_radius(both, MISSILE) == 250.0
     assert threat_radius(both, Place("radar", 0)) == 700.0
     track, inside = inside_rows()
-    assert find_rows_inside_threats(failures(ENTERED, 4), both, track).tolist() == inside.tolist()
+    assert find_rows_inside_threats(collect_failures(ENTERED, 4), both, track).tolist() == inside.tolist()
     assert not find_rows_inside_threats(Failures({}, {}), both, track).any()
 
 
 def test_threats_without_a_place_in_the_picture_get_no_label() -> None:
-    labels = make_fail_labels(failures(ENTERED, 4), ROUTE[:, :2], {})
+    labels = make_fail_labels(collect_failures(ENTERED, 4), ROUTE[:, :2], {})
     assert [label.text for label in labels] == ["leg 1 (to item 9): slope"]

@@ -12,7 +12,7 @@ from logs import theme
 from logs.verdict.places import Place
 from logs.views.draw_scene import Projection, draw_scene
 from logs.views.drawing import png_bytes
-from logs.views.failures import failures
+from logs.views.failures import collect_failures
 from logs.views.scene import SceneView
 from tests.logs.views.figure_data import make_verdict
 from tests.logs.views.report.report_data import make_setup, make_track
@@ -45,7 +45,7 @@ def test_a_step_to_the_viewer_stays_on_its_spot_and_comes_nearer(azimuth: float,
 
 
 def drawn(setup: Any, track: Any, verdict: Any) -> Any:
-    return draw_scene(SceneView(setup, track, failures(verdict, len(setup.route.points))))
+    return draw_scene(SceneView(setup, track, collect_failures(verdict, len(setup.route.points))))
 
 
 def legend(figure: Any) -> set[str]:
