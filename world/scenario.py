@@ -28,7 +28,7 @@ from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean, toml_text, write_atomically
 from world.forecast.forecast import Forecast
-from world.forecast.scenario_wind import ForecastSite, forecast_wind, scenario_forecast
+from world.forecast.scenario_wind import ForecastSite, forecast_wind, read_table_forecast
 from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
 from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo
 from world.html_table import html_table
@@ -418,7 +418,7 @@ def scenario_from_spec(
     if raster is not None:
         # The terrain extends to the ground station of the link if the station lies outside the area.
         require_covered(raster, origin, bounds)
-        box = _box_with(raster, origin, bounds, station_position(spec.link, origin))
+        box = _extend_box(raster, origin, bounds, station_position(spec.link, origin))
         ground = read_terrain(raster, origin, box, GROUND_BUFFER)
     elif ground is None and spec.terrain.kind == "flat":
         ground = make_flat_terrain(bounds, float(spec.terrain.amsl_m or 0.0), 5 * GROUND_BUFFER)
@@ -584,7 +584,7 @@ def _assemble_scenario(
     )
 
 
-def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
+def _extend_box(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
     """Return an area that is extended to contain a position, if the elevation file has pixels there.
 
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
@@ -611,7 +611,7 @@ def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenari
     if terrain is None or table.kind != "dem" or math.isfinite(float(terrain.height(*position))):
         return scenario
     raster, _ = _open_terrain(table, scenario.name, None)
-    box = _box_with(raster, scenario.origin, scenario.bounds, position)
+    box = _extend_box(raster, scenario.origin, scenario.bounds, position)
     if box is scenario.bounds:
         return scenario
     extended_terrain = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
@@ -759,7 +759,7 @@ def without_forecast(scenario: Scenario) -> Scenario:
     return replace(scenario, spec=spec, wind=replace(scenario.wind, field=None, forecast=None))
 
 
-def forecast_of_scenario(scenario: Scenario) -> Forecast:
+def read_scenario_forecast(scenario: Scenario) -> Forecast:
     """Read the forecast that a scenario's [wind] names, for the area of its map.
 
     Raises ForecastError for a file that cannot be used.
@@ -768,7 +768,7 @@ def forecast_of_scenario(scenario: Scenario) -> Forecast:
     if scenario.terrain is not None:
         ground = float(scenario.terrain.height(scenario.start[0], scenario.start[1]))
     start_ground = float(scenario.start[2]) if math.isnan(ground) else ground
-    return scenario_forecast(scenario.spec.wind, scenario.origin, scenario.bounds, start_ground)
+    return read_table_forecast(scenario.spec.wind, scenario.origin, scenario.bounds, start_ground)
 
 
 def _with_forecast_wind(scenario: Scenario) -> Scenario:
@@ -779,10 +779,10 @@ def _with_forecast_wind(scenario: Scenario) -> Scenario:
     """
     if scenario.spec.wind.forecast is None or scenario.spec.at is None:
         return scenario
-    return in_forecast_member(scenario, forecast_of_scenario(scenario), 0)
+    return with_forecast_member(scenario, read_scenario_forecast(scenario), 0)
 
 
-def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
+def with_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
     """Return a scenario with the wind of one member of its forecast, from the time of flight on.
 
     Raises ForecastError if the forecast does not cover the start and the destination at this time.

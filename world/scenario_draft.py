@@ -119,7 +119,7 @@ def make_draft(
     margin = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
     highest_ground, bounds = 0.0, _enclosing_box(endpoints, margin)
     if raster is not None:
-        bounds, highest_ground = _survey_ground(
+        bounds, highest_ground = _find_covered_area(
             raster, origin, {"start": start, "destination": destination}, endpoints, margin
         )
     ceiling = math.ceil((highest_ground + height + _HEADROOM_M) / _CEILING_STEP_M) * _CEILING_STEP_M
@@ -129,7 +129,7 @@ def make_draft(
     )
 
 
-def _survey_ground(
+def _find_covered_area(
     raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
     """Find an area around start and destination that has elevation data, and the highest ground in it, m.

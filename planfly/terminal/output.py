@@ -200,7 +200,7 @@ def _durations_file() -> Path:
     return Path(user_cache_dir("planfly")) / "durations.json"
 
 
-def _last_durations() -> dict[str, _LastDuration]:
+def _read_durations() -> dict[str, _LastDuration]:
     """Read the duration of the last stage of each kind; empty if the file is missing or invalid."""
     durations = {}
     with contextlib.suppress(OSError, ValueError, RecursionError):
@@ -214,7 +214,7 @@ def _last_durations() -> dict[str, _LastDuration]:
 
 def _write_duration(kind: str, duration: _LastDuration) -> None:
     """Store the duration of the last stage of a kind; ignore an error in writing the file."""
-    text = json.dumps(_last_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
+    text = json.dumps(_read_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
     with contextlib.suppress(OSError):
         _durations_file().parent.mkdir(parents=True, exist_ok=True)
         write_atomically(_durations_file(), text)
@@ -272,7 +272,7 @@ class _TimeLeft:
 
         remaining_units: units of work still to be done, 0 if unknown.
         """
-        last_duration = _last_durations().get(self._kind)
+        last_duration = _read_durations().get(self._kind)
         if last_duration is not None and remaining_units > 0.0 and last_duration.per_unit > 0.0:
             return f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the rate of the last run"
         if last_duration is not None:

@@ -42,7 +42,7 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
                 for number, row in enumerate(cursor, 1):
                     location = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
-                    shape = _read_shape(columns.pop(column, None), code, f"{source}: {location}")
+                    shape = _decode_geometry(columns.pop(column, None), code, f"{source}: {location}")
                     # Only text and numbers; a column "identifier" or "title" is also added under the key
                     # "name".
                     plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
@@ -77,7 +77,7 @@ def _crs_definition(database: sqlite3.Connection, system: int) -> str:
     return str(definition)
 
 
-def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
+def _decode_geometry(blob: Any, code: str, source: str) -> dict[str, Any]:
     """Convert a GeoPackage geometry to GeoJSON in longitude and latitude.
 
     code: coordinate reference system as `_crs_definition` returns it.

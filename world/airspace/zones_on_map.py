@@ -282,13 +282,13 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
     return [tuple(part) for part in parts]
 
 
-def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
+def level_altitudes(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
     """Return the altitude of a floor or a ceiling above each point of the ground, m AMSL, (n,).
 
     ground: altitudes of the ground, m AMSL, (n,).
     default: altitude for a level of None, m AMSL.
 
-    >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
+    >>> level_altitudes(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
     """
     if level is None:
@@ -314,7 +314,7 @@ def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, defaul
     for ring in zone_rings(zone):
         ground = np.full(len(ring), default_floor) if terrain is None else terrain.height(ring[:, 0], ring[:, 1])
         ground = np.where(np.isfinite(ground), ground, default_floor)
-        bottom = np.maximum(level_heights(zone.floor, ground, -np.inf), ground)
-        top = np.maximum(level_heights(zone.ceiling, ground, default_ceiling), bottom)
+        bottom = np.maximum(level_altitudes(zone.floor, ground, -np.inf), ground)
+        top = np.maximum(level_altitudes(zone.ceiling, ground, default_ceiling), bottom)
         walls.append(np.stack([np.column_stack([ring, bottom]), np.column_stack([ring, top])], axis=1))
     return walls

@@ -86,7 +86,7 @@ class Forecast:
             datetime.fromtimestamp(float(self.times[after]), UTC),
         )
 
-    def end_of_steps(self, departure: datetime) -> datetime:
+    def interpolation_end(self, departure: datetime) -> datetime:
         """Return the time up to which the wind after a departure can be interpolated.
 
         It is the time before the first step longer than `LONGEST_STEP`, or the last time of the forecast if there is
@@ -113,7 +113,7 @@ class Forecast:
             source=self.source,
             issued=self.issued,
             departure=departure,
-            last_time=self.end_of_steps(departure),
+            last_time=self.interpolation_end(departure),
             grid_km=self.grid_km,
             levels=self.altitudes.shape[-1],
             lowest_amsl=float(self.altitudes[..., 0].max()),

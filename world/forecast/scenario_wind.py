@@ -60,7 +60,7 @@ def departure_of(at: str) -> datetime:
     return parse_span(at)[0].astimezone(UTC)
 
 
-def scenario_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, start_ground: float) -> Forecast:
+def read_table_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, start_ground: float) -> Forecast:
     """Read the forecast that a [wind] table names, for the area of a scenario.
 
     start_ground: ground at the mission's start, m AMSL.
@@ -200,7 +200,7 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
         )
 
 
-def shift_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:
+def with_mean_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:
     """Return a wind with another mean profile; the wind of a forecast keeps its deviations from the mean.
 
     speed: m/s, at the reference altitude.

@@ -143,7 +143,7 @@ def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, 
 
 
 @inner
-def _level_number(
+def _interpolate_level_value(
     field: Floats, corner: int, steps: tuple[int, int, int], fractions: tuple[float, float, float], number: int
 ) -> float:
     """Interpolate one number of a level linearly in time, latitude and longitude, between eight nodes.
@@ -202,13 +202,13 @@ def interpolate_field(
         column_step if columns > 1 else 0,
     )
     fractions = (time_fraction, row_fraction, column_fraction)
-    low = _level_number(field, corner, steps, fractions, _ALTITUDE)
+    low = _interpolate_level_value(field, corner, steps, fractions, _ALTITUDE)
     level = 0
     fraction = 0.0
     if levels > 1 and altitude > low:
         high = low
         while level < levels - 1:
-            high = _level_number(field, corner + (level + 1) * _NODE_SIZE, steps, fractions, _ALTITUDE)
+            high = _interpolate_level_value(field, corner + (level + 1) * _NODE_SIZE, steps, fractions, _ALTITUDE)
             if high >= altitude:
                 break
             low = high
@@ -218,11 +218,11 @@ def interpolate_field(
     else:
         altitude = low
     below = corner + level * _NODE_SIZE
-    east = _level_number(field, below, steps, fractions, _EAST)
-    north = _level_number(field, below, steps, fractions, _NORTH)
+    east = _interpolate_level_value(field, below, steps, fractions, _EAST)
+    north = _interpolate_level_value(field, below, steps, fractions, _NORTH)
     if fraction > 0.0:
-        east += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _EAST) - east)
-        north += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _NORTH) - north)
+        east += fraction * (_interpolate_level_value(field, below + _NODE_SIZE, steps, fractions, _EAST) - east)
+        north += fraction * (_interpolate_level_value(field, below + _NODE_SIZE, steps, fractions, _NORTH) - north)
     return east, north, altitude
 
 
