@@ -1,4 +1,4 @@
-"""Exact highest ground in each cell of a map, for the bilinear surface between a raster's pixels.
+"""Find the highest ground in each cell of a map, exactly for the bilinear surface between a raster's pixels.
 
 Between four pixels the surface has no summit of its own.  Its highest point in a square is at a pixel in the square, or
 on the square's sides.

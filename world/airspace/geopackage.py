@@ -22,7 +22,9 @@ _WGS84_CODE = 4326
 
 
 def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the location of each feature in a file, and the feature as GeoJSON in longitude and latitude.
+    """Yield (location, feature) for each feature of a file, as GeoJSON in longitude and latitude.
+
+    The location is the table and the row, for messages.
 
     Raises ScenarioError for a file that cannot be read as a GeoPackage, and for an invalid geometry.
     """

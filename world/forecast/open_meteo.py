@@ -1,4 +1,4 @@
-"""Read the forecast of Open-Meteo's API: hourly winds at heights above ground and on pressure levels, as JSON."""
+"""Read a forecast in the JSON of Open-Meteo's API: hourly winds at heights above ground and on pressure levels."""
 
 import re
 from collections.abc import Mapping
@@ -25,6 +25,7 @@ _SPEED_NAME = re.compile(r"^wind_?speed_(\d+)(m|hPa)$")
 class _Place(NamedTuple):
     """Winds at one place.
 
+    latitude, longitude: deg.
     times: (t,) s since 1970.
     altitudes: (t, k) m AMSL, ascending.
     velocities: (t, k, 2) m/s.
@@ -95,7 +96,7 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
 
 
 def _make_error(path: Path, field: str, allowed: str) -> ForecastError:
-    """Return the error for a field of a file."""
+    """Make the error about a field of a file; ``allowed`` states the expected values."""
     return ForecastError(f"{path}: {field}: {allowed}", file=str(path), field=field, allowed=allowed)
 
 
@@ -104,6 +105,8 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 
     entry: JSON object of the place.
     ground_amsl: altitude of the ground, m, if the object states no elevation.
+
+    Raises ForecastError for missing or invalid values.
     """
     hourly, units = entry.get("hourly"), entry.get("hourly_units")
     if not isinstance(hourly, dict) or not isinstance(units, dict):
@@ -161,7 +164,12 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 
 
 def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry: dict[str, Any]) -> Floats:
-    """Return the times of the hourly variables, (t,) s since 1970 in UTC."""
+    """Return the times of the hourly variables, (t,) s since 1970 in UTC.
+
+    entry: object of the place, whose UTC offset applies to times without one.
+
+    Raises ForecastError for missing, invalid or unordered times.
+    """
     values = hourly.get("time")
     if not isinstance(values, list) or not values:
         raise _make_error(path, "hourly.time", "missing: a list of times is needed")
@@ -184,7 +192,10 @@ def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry
 def _read_number(
     path: Path, entry: dict[str, Any], name: str, low: float, high: float, default: float | None = None
 ) -> float:
-    """Return the number under a name of an entry. Raises ForecastError if it is missing or outside its limits."""
+    """Return a number of an entry by its name, or the default if it is missing.
+
+    Raises ForecastError if it is missing without a default, or not between ``low`` and ``high``.
+    """
     value = entry.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise _make_error(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
@@ -198,6 +209,8 @@ def _read_column(
 
     units: unit of each variable.
     factors: factor of each allowed unit; the factor of the resulting unit is 1.
+
+    Raises ForecastError for an unknown unit, and for values that are missing or not numbers.
     """
     factor = unit_factor(units.get(name), factors)
     if factor is None:

@@ -136,7 +136,9 @@ def _call_library(path: Path, function: Callable[[], Any]) -> Any:
 
 
 class _ForecastReader:
-    """Reader of the wind in the xarray datasets of one file; its methods share the axes of the result.
+    """Reader of the wind in the xarray datasets of one file.
+
+    Its methods share the axes of the result: times, latitudes and longitudes.
 
     path: the file.
     box: area around the mission.
@@ -149,7 +151,7 @@ class _ForecastReader:
         self.ground: Floats | None = None
 
     def _error(self, field: str, allowed: str) -> ForecastError:
-        """Return the error for a variable of the file, with the allowed values."""
+        """Make the error about a variable of the file; ``allowed`` states the expected values."""
         return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
 
     def read(self, datasets: Sequence[Any]) -> Forecast:
@@ -207,9 +209,9 @@ class _ForecastReader:
     # Times.
 
     def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
-        """Return the time dimension of a variable, and its times in s since 1970.
+        """Return the name of a variable's time dimension, and its times in s since 1970.
 
-        The dimension is None for a variable with a single time.
+        The name is None for a variable with a single time. Raises ForecastError without a usable time coordinate.
         """
         times = _time_coordinates(array)
         for name in ("valid_time", *array.dims, "time", *times):
@@ -243,7 +245,7 @@ class _ForecastReader:
     # Axes.
 
     def _lat_lon_coordinates(self, array: Any) -> tuple[Any, Any]:
-        """Return the latitude and longitude coordinates of a variable."""
+        """Return the latitude and longitude coordinates of a variable. Raises ForecastError if one is missing."""
         coordinates = []
         for standard_name, names in (("latitude", ("lat", "latitude")), ("longitude", ("lon", "longitude"))):
             for name, coordinate in array.coords.items():
@@ -255,7 +257,11 @@ class _ForecastReader:
         return coordinates[0], coordinates[1]
 
     def _axes_around_box(self, array: Any) -> tuple[Floats, Floats]:
-        """Return the latitudes and longitudes of the nodes around the box, in ascending order, deg."""
+        """Return the latitudes and longitudes of a variable's nodes around the box, in ascending order, deg.
+
+        For a grid with two-dimensional coordinates, they are the axes of the regular grid to interpolate to. Raises
+        ForecastError if the box is outside the grid.
+        """
         latitude, longitude = self._lat_lon_coordinates(array)
         if latitude.ndim == 2:
             # Grids with two-dimensional coordinates are interpolated to a regular grid.
@@ -328,7 +334,7 @@ class _ForecastReader:
         return None
 
     def _height_factor(self, array: Any) -> float:
-        """Return the factor that converts a height or a geopotential to m."""
+        """Return the factor that converts a height or a geopotential to m. Raises ForecastError for other units."""
         units = array.attrs.get("units")
         factor = unit_factor(units, HEIGHT_UNITS)
         if factor is None and str(units).replace(" ", "") in GEOPOTENTIAL_UNITS:
@@ -459,6 +465,8 @@ class _ForecastReader:
         """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL, from the geopotential height.
 
         wind: variable of the wind.
+
+        Raises ForecastError if no dataset contains the geopotential height of these levels.
         """
         wind_level = self._find_level(wind, wind.name)
         for dataset in datasets:
@@ -486,7 +494,7 @@ class _ForecastReader:
 
         level_dim: name of the dimension of the levels; None for a single level.
 
-        m is the number of members, and t is 1 for a variable without times.
+        m is the number of members, and t is 1 for a variable without times. Raises ForecastError for another grid.
         """
         latitude, longitude = self._lat_lon_coordinates(array)
         axes = self._axes_around_box(array)
@@ -565,7 +573,7 @@ def _is_height(name: Any, array: Any) -> bool:
 
 
 def _partner_key(name: str, letter: str) -> str:
-    """Return the name of a wind component without its axis, which is equal for the two components of one wind.
+    """Return the name of a wind component without its axis, so that both components of a wind have the same key.
 
     letter: letter of the axis, "u" or "v".
 
