@@ -455,7 +455,8 @@ def _to_window_pixels(
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
     """Return the largest box on the map inside a raster, [[west, east], [south, north]] m.
 
-    The box has the proportions of the raster's extent; its size is found to within half a percent. Raises TerrainError if no box fits.
+    The box has the proportions of the raster's extent; its size is found to within half a percent.
+    Raises TerrainError if no box fits.
 
     >>> raster = open_raster("jacksboro")
     >>> tile_bounds(raster, raster.centre).round(-2).tolist()

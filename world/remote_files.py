@@ -51,7 +51,7 @@ OnBytes = Callable[[int], None]
 
 
 class _IncompleteAnswer(Exception):
-    """An answer does not contain the requested bytes; the message says why."""
+    """Error for an answer that does not contain the requested bytes; the message states the reason."""
 
 
 @dataclass(slots=True)
