@@ -454,7 +454,7 @@ class _Lines:
                 )
 
     def refresh(self) -> None:
-        """Print the first line of a stage that has reported nothing; print the elapsed time if no line was due for long."""
+        """Print the first line if nothing is reported yet, or the elapsed time after a minute without a line."""
         with self._lock:
             if self._is_over:
                 return
