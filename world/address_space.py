@@ -1,4 +1,4 @@
-"""End a command with one line if a limit of address space (``ulimit -v``) is too low to import a library.
+"""End a command with a one-line error if ``ulimit -v`` leaves too little address space to import a library.
 
 OpenBLAS, which NumPy and SciPy contain, requests its buffers in an endless loop while it holds the interpreter: without
 room for them, neither Ctrl-C nor SIGTERM ends the process.  LLVM and others end the process without a message.
@@ -20,7 +20,7 @@ class AddressSpaceError(MemoryError):
 
 
 def has_address_space(size: int) -> bool:
-    """Return True if ``size`` bytes of address space are free; a test mapping is made and released.
+    """Return True if ``size`` bytes of address space are free, tested by mapping and releasing them.
 
     >>> has_address_space(2**20)
     True
@@ -42,7 +42,10 @@ class AddressSpaceGuard:
         self._limit = limit
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Raise AddressSpaceError if too little address space is free; else let other hooks find the module."""
+        """Raise AddressSpaceError if too little address space is free to import a module.
+
+        Otherwise return None, so that the other hooks find the module.
+        """
         required_bytes = LLVM_MIN_FREE_BYTES if name.startswith("llvmlite") else MIN_FREE_BYTES
         if not has_address_space(required_bytes):
             limit = f"{self._limit // 1024:,} kB of address space (ulimit -v)"

@@ -154,12 +154,12 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReturnRequirements:
-    """Requirements on RTL (return to launch), glides and go-arounds, and RTL settings of a plan's mission.
+    """Requirements on RTL (return to launch), glides and go-arounds, and RTL settings of the planned mission.
 
     require: contains "rtl" if every RTL must be safe, "glide" if the engine may fail anywhere, "go_around" if a landing
         may be aborted anywhere on its glide.
-    rtl_altitude: height above home, m; None if the scenario sets none.
-    rally: (n, 3) east, north, m AMSL.
+    rtl_altitude: height above home to which an RTL climbs or descends, m; None if the scenario sets none.
+    rally: rally points, (n, 3) m: east, north, altitude AMSL.
     rtl_autoland: ArduPlane's RTL_AUTOLAND; None if the scenario sets none.
     """
 
@@ -210,7 +210,9 @@ def make_landing(
 ) -> LandingStrip | None:
     """Convert a scenario's [landing] table to a landing strip; None without a table.
 
-    Raises ScenarioError as `make_home` does.
+    source, bounds: name of the file in messages, and area of the scenario, (2, 2) m.
+
+    Raises ScenarioError if the landing point is outside the area, or if the ground height there is not known.
     """
     if table is None:
         return None
@@ -257,7 +259,7 @@ def _position_on_ground(
     bounds: Floats,
     origin: GeoOrigin,
 ) -> Floats:
-    """Return a position with the altitude of the ground there, (3,) m.
+    """Return a map position (east, north, m) with the altitude of the ground there, (3,) m.
 
     key: name of the scenario's table in messages.
     bounds: area of the scenario, (2, 2) m.

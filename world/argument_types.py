@@ -1,4 +1,4 @@
-"""Check texts, paths, lists and functions, and convert numbers, in the arguments of functions of the API."""
+"""Check the types of arguments of API functions, and convert their numbers to plain Python numbers."""
 
 import functools
 import inspect

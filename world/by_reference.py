@@ -79,7 +79,7 @@ def by_reference(cls: _Class) -> _Class:
 
 
 def _get_layout(value: Any) -> _Layout:
-    """Return the memory layout of an instance, which is made at the first call and stored in the instance."""
+    """Return the memory layout of an instance; it is made at the first call and stored in the instance."""
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
         tuple_type = _replace_references(typeof_impl.dispatch(tuple)(value, None))
@@ -158,7 +158,10 @@ class _Field(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # numba names no argument
-        """Return the numba type of a field; None if the named tuple has no such field."""
+        """Return the numba type of a field; None if the named tuple has no such field.
+
+        kind: reference to the named tuple.
+        """
         return _find_field(kind, name)[1] if name in kind.tuple_type.fields else None
 
 

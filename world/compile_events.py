@@ -1,4 +1,4 @@
-"""Callbacks before a kernel is compiled, and the time that compiling takes.
+"""Call functions before a kernel is compiled, and measure the time that compiling takes.
 
 A kernel is compiled only if it is not in the cache.
 """
@@ -41,9 +41,9 @@ def notify_before_compiling(callback: BeforeCompiling, *, once: bool = False) ->
 
 
 class CompileTimer:
-    """Timer of the time during which kernels were compiled in this process.
+    """Timer for the compilation of kernels in this process.
 
-    seconds: time of the compilations that have ended, s; time in which several compilations run is counted once.
+    seconds: total time of the ended compilations, s; simultaneous compilations are timed once.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Formats of elevation files, and the files that planfly ships: lists that the command line's help reads, too.
+"""Formats of elevation files, and elevation files that planfly ships, without imports that would slow the help.
 
 `world.raster.open_raster` opens them.
 """

@@ -1,4 +1,4 @@
-"""Join several elevation files into one raster: tiles of a folder, a GDAL virtual raster (.vrt), or a list.
+"""Join several elevation files into one raster: the tiles in a folder, in a GDAL virtual raster (.vrt) or in a list.
 
 All tiles lie on one grid: the same reference system, the same pitch, and pixels that coincide where tiles overlap.
 Ground that no tile covers is a gap.  This module only reads the names of the files of a virtual raster: GDAL's driver

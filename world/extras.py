@@ -19,9 +19,9 @@ class Extra(NamedTuple):
     """Extra of planfly.
 
     name: name for pip.
-    needs: beginning of a sentence that names the feature.
-    purpose: features that it adds, for the documentation.
-    modules: imported modules, one of each package that it installs.
+    needs: beginning of the message about a missing extra, such as "campaigns need".
+    purpose: features that the extra adds, for the documentation.
+    modules: one module of each package that the extra installs.
     """
 
     name: str
@@ -105,7 +105,10 @@ def require_extra(name: str, needs: str = "") -> None:
 
 
 def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraError:
-    """Make the error about a missing module, with the command that installs its extra."""
+    """Make the error about a missing module, with the command that installs its extra.
+
+    needs: as for `require_extra`.
+    """
     command = f"pip install 'planfly[{extra.name}]'"
     line = f"{needs or extra.needs} the extra '{extra.name}': {command}"
     error = MissingExtraError(line, field="extra", value=extra.name, allowed=command)

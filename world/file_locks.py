@@ -15,10 +15,11 @@ LOCKS_FOLDERS = fcntl is not None
 
 
 def try_lock(handle: int) -> bool:
-    """Lock an open file until it is closed; return True if successful.
+    """Lock an open file until it is closed; return True, or False if it is already locked.
 
-    On Linux and macOS an open folder can be locked, too. Returns False if the file is already locked. Raises OSError if
-    the file system does not support locks.
+    handle: file descriptor; on Linux and macOS it may belong to a folder.
+
+    Raises OSError if the file system does not support locks.
 
     >>> from tempfile import TemporaryFile
     >>> with TemporaryFile() as file:

@@ -29,9 +29,9 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class TextLine(NamedTuple):
-    """Line of a file, as messages name it.
+    """Position in a file, as messages name it.
 
-    number: from 1.
+    number: number of the line, from 1.
 
     >>> print(TextLine("a.waypoints", 4))
     a.waypoints:4
@@ -41,7 +41,7 @@ class TextLine(NamedTuple):
     number: int
 
     def __str__(self) -> str:
-        """Return the position as text: file and line."""
+        """Return the position as text, such as "a.waypoints:4"."""
         return f"{self.file}:{self.number}"
 
 
@@ -76,7 +76,7 @@ _FOLDER_COMMANDS = {
 
 
 def missing_text(path: Path) -> str:
-    """Describe why a path is not a plain file: it does not exist, or it is a folder with certain contents.
+    """Return the reason why a path is not a plain file: it does not exist, or it is a folder with certain contents.
 
     >>> missing_text(Path("missing.plan")), missing_text(Path("/proc/self/task"))
     ('no such file', 'is a folder')
@@ -368,7 +368,7 @@ def remove_temporary_folders(process_id: int) -> bool:
 
     process_id: number of the killed process.
 
-    Returns True if there were none.
+    Returns True if there was nothing to remove.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()

@@ -51,7 +51,7 @@ class GeoOrigin:
 
 @lru_cache(maxsize=32)
 def _make_projection(origin: GeoOrigin) -> "Proj":
-    """Return the azimuthal equidistant projection about an origin."""
+    """Make the azimuthal equidistant projection about an origin."""
     # Imported here and below, as pyproj imports an HTTP client, and a scenario in metres needs neither.
     from pyproj import Proj
 
@@ -110,7 +110,7 @@ def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tup
 
 
 def crs_transformer(crs: str) -> "Transformer":
-    """Return a transformer from WGS84 longitude and latitude (degrees) to the horizontal part of a CRS.
+    """Return a transformer from WGS84 longitude and latitude (deg) to x and y of a CRS (reference system).
 
     Heights must not be transformed with it, because PROJ without a geoid grid silently returns them unchanged. Raises
     ValueError for a CRS that PROJ does not know.
@@ -143,7 +143,7 @@ def height_unit(crs: str) -> tuple[str, float]:
 
 
 def crs_to_wkt(crs: str, *, with_height: bool = False) -> str:
-    """Convert a CRS that PROJ knows, such as "EPSG:4326", to well-known text.
+    """Convert the name of a CRS that PROJ knows, such as "EPSG:4326", to well-known text.
 
     with_height: True to add the height above the ellipsoid to a two-dimensional CRS.
     """
@@ -210,7 +210,7 @@ class PolyMap:
 def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
     """Make a record of `POLYMAP`, a polynomial map over a rectangle.
 
-    centre, half_widths: of the rectangle, (2,).
+    centre, half_widths: centre and half-widths of the rectangle, (2,) each.
     u, v: coefficients of the two components of the map, (n, n) each.
     """
     size = len(u)
@@ -242,7 +242,7 @@ def fit_polymap(
     half_widths = np.array([max((x1 - x0) / 2, 1e-9), max((y1 - y0) / 2, 1e-9)])
 
     def node_grid(count: int) -> tuple[Floats, Floats]:
-        """Return the Chebyshev nodes of a grid over the unit square, two arrays (count^2,)."""
+        """Return the coordinates of a grid of Chebyshev nodes over [-1, 1] x [-1, 1], (count^2,) each."""
         nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
         u, v = np.meshgrid(nodes, nodes)
         return u.ravel(), v.ravel()

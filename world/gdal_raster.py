@@ -135,7 +135,7 @@ def _raise_unplaced(file: Path) -> NoReturn:
 
 
 def _read_crs(file: Path, driver: str, source: Any) -> str | None:
-    """Read the reference system of an open file as WKT, with its height axis; None if the file states none.
+    """Return the reference system of an open file as WKT, with its height axis if any; None if the file states none.
 
     driver: GDAL driver of the file.
     source: the open file.
@@ -227,7 +227,7 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set heights to NaN, in place, in the blocks that a GeoTIFF omits.
+    """Set heights to NaN, in place, in the blocks that were never written to a GeoTIFF.
 
     source: the open file.
     top, left: row and column of the file at which ``heights`` starts.

@@ -211,7 +211,7 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
 def window_exposure(
     begin_fraction: float, end_fraction: float, length2: float, dot: float, start2: float, scale: float
 ) -> float:
-    """Return the exposure on a part of a segment to a threat, averaged over the whole segment.
+    """Return the exposure to a threat on a part of a segment, averaged over the whole segment.
 
     begin_fraction, end_fraction: limits of the part, as fractions of the segment.
     length2: squared length of the segment, m^2.

@@ -32,7 +32,8 @@ class HeightDatum:
     """Vertical datum of heights.
 
     text: description of the datum after the conversion.
-    sea_level: height of mean sea level in the file at longitudes and latitudes (deg), m; None if it is 0 everywhere.
+    sea_level: function from longitudes and latitudes (deg) to the height of mean sea level in the file, m; None if this
+        height is 0 everywhere.
     """
 
     text: str
@@ -96,7 +97,10 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
 
 @cache
 def _find_geoid() -> tuple[str, Any]:
-    """Find the first geoid whose grid is installed; return its name and the conversion to heights above it."""
+    """Return the name of the first geoid whose grid is installed, and the transformer to heights above it.
+
+    Raises ValueError if none is installed.
+    """
     from pyproj import Transformer
     from pyproj.transformer import TransformerGroup
 

@@ -1,4 +1,4 @@
-"""Exact highest ground in each cell of a map, for the bilinear surface between a raster's pixels.
+"""Find the highest ground in each cell of a map, exactly for the bilinear surface between a raster's pixels.
 
 Between four pixels the surface has no summit of its own.  Its highest point in a square is at a pixel in the square, or
 on the square's sides.
@@ -51,17 +51,17 @@ def _fill_cells(
             if j < columns:
                 end[0], end[1] = west + (j + 1) * cell_side, start[1]
                 side_height = -segment_clearance(heights, to_pixel, start, end)[0]
-                _raise_cell(max_heights, i - 1, j, side_height)
-                _raise_cell(max_heights, i, j, side_height)
+                _update_max_height(max_heights, i - 1, j, side_height)
+                _update_max_height(max_heights, i, j, side_height)
             if i < rows:
                 end[0], end[1] = start[0], south + (i + 1) * cell_side
                 side_height = -segment_clearance(heights, to_pixel, start, end)[0]
-                _raise_cell(max_heights, i, j - 1, side_height)
-                _raise_cell(max_heights, i, j, side_height)
+                _update_max_height(max_heights, i, j - 1, side_height)
+                _update_max_height(max_heights, i, j, side_height)
     for i in range(rows):
         for j in range(columns):
             if not math.isnan(max_heights[i, j]):
-                _raise_cell(
+                _update_max_height(
                     max_heights,
                     i,
                     j,
@@ -70,7 +70,7 @@ def _fill_cells(
 
 
 @inner
-def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
+def _update_max_height(max_heights: Floats, i: int, j: int, height: float) -> None:
     """Raise the highest ground of cell (i, j) to a height if the height is larger or NaN.
 
     max_heights: (rows, columns) highest ground in each cell, m; updated. A cell outside the array is ignored.

@@ -1,4 +1,4 @@
-"""Interruption by signals: blocks that must complete, temporary files to remove, and child processes to end.
+"""Handle interruption by signals: complete blocks, remove temporary files, and end child processes.
 
 The application turns a signal into a call of `interrupt`; work that must complete is done within `delay_signals`.
 """

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 
 class DocumentConfig:
-    """Base of a plain data class with a JSON schema.
+    """Base class for a plain data class with a JSON schema.
 
     pydantic reads the settings to make a schema or write an answer; the data class itself does not need pydantic.
     The strings below its fields become the fields' descriptions, unknown fields and numbers that are not finite are

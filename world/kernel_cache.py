@@ -1,4 +1,4 @@
-"""Cache folder of compiled kernels, named by a digest of their sources.
+"""Choose the cache folder of compiled kernels, whose name contains a digest of their sources.
 
 Numba's cache checks only the file that defines a kernel, and misses changes to kernels and constants from other files.
 So the cache folder's name contains a digest of every file that defines a kernel, and of every planfly file that these

@@ -1,4 +1,4 @@
-"""Files of compiled kernels that begin with a digest, so that a damaged file is noticed and its kernel compiled again.
+"""Store compiled kernels in files that begin with a digest, so that a kernel is compiled again if its file is damaged.
 
 Numba loads its files unchecked: a cut file ends the process with a traceback, and a flipped bit in machine code with a
 segmentation fault.
@@ -45,7 +45,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
             self._write(self._folder / forms[key], repr(key), data)
 
     def _load_index(self) -> dict[Any, str]:
-        """Return the names of the data files by key; empty if the index is from another version of the source."""
+        """Return the names of the data files by key; empty if the index is missing or outdated."""
         version, stamp, forms = _read_checked(self._folder / self._index_name, "") or (None, None, {})
         return forms if (version, stamp) == (self._version, self._source_stamp) else {}
 

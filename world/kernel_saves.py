@@ -35,13 +35,13 @@ class CacheWriteLock:
         self._thread_state = threading.local()
 
     def register(self) -> None:
-        """Listen to numba's events until this process ends."""
+        """Register listeners with numba, which take and release the lock until this process ends."""
         listen: Any = event.register
         listen("numba:compile", _BeginEndListener(lambda: None, self._acquire))
         listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
     def _track_depth(self, step: int) -> None:
-        """Count the nested uses of numba's compiler lock by this thread; release the file lock after the last.
+        """Track how often this thread has taken numba's compiler lock; release the file lock after the last release.
 
         step: 1 when the compiler lock is taken, -1 when it is released.
         """

@@ -106,8 +106,8 @@ def inner(kernel: _Kernel) -> _Kernel:
 def inlined(kernel: _Kernel) -> _Kernel:
     """Compile a function as `inner` does, and let LLVM inline it into the kernels that call it.
 
-    A call passes seven numbers for each array, and increments the array's reference count. Many kernels do less work
-    than that. Without inlining the planner's graded scores take a quarter longer. Numba's own inlining
+    Without inlining, a call passes seven numbers for each array, and increments the array's reference count. Many
+    kernels do less work than that: the planner's graded scores would take a quarter longer. Numba's own inlining
     (`inline="always"`) would not be faster, but numba would type and translate each copy again.
     """
     return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
@@ -143,7 +143,7 @@ class _InnerKernel:
 
     @functools.cached_property
     def _wrapper(self) -> Any:
-        """Return a compiled function that Python can call, and that calls this kernel."""
+        """Compiled function that Python can call, and that calls this kernel."""
         kernel = self
         return _make_dispatcher(lambda *arguments: kernel(*arguments))
 
@@ -179,7 +179,7 @@ def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
 
 @inlined
 def copy_into(target: NDArray[Any], values: NDArray[Any]) -> None:
-    """Copy numbers (n,) into an array, or part of one, of the same length, which is not checked.
+    """Copy numbers (n,) into an array or a slice of the same length; the length is not checked.
 
     Numba's ``out[:] = values`` checks the length. It would compile the error message, with Unicode handling, into each
     kernel.
@@ -213,7 +213,7 @@ def sort_few(values: NDArray[Any]) -> None:
 
 
 def read_only(array: _Array) -> _Array:
-    """Return a view of the array that cannot be written.
+    """Return a read-only view of an array.
 
     Numba compiles a kernel separately for writable and for read-only arrays. With this function a kernel gets only
     read-only arrays, and is compiled once.
@@ -227,7 +227,7 @@ def read_only(array: _Array) -> _Array:
 
 
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
-    """Make the type of a record whose fields are attributes, in Python and in compiled code.
+    """Make the dtype of a record whose fields can be read as attributes, in Python and in compiled code.
 
     entries: fields in order. Each is the name of a float64, or (name, type) or (name, type, shape) as in numpy.
 

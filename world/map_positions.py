@@ -1,4 +1,4 @@
-"""Convert the positions of a scenario file to its map: start, destination, points on the ground, and threats."""
+"""Convert the positions in a scenario file to map positions, and check them: start, destination, threats and others."""
 
 import math
 
@@ -13,7 +13,7 @@ from world.threats import Threats, threat_label
 
 
 def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
-    """Return the east and north that a table states, m; positions in degrees are converted to the map."""
+    """Return the map position (east, north, m) that a table states in metres or in degrees."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
     east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
@@ -44,7 +44,7 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
 
 
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: GeoOrigin) -> None:
-    """Raise ScenarioError, with the distance from the area, for a position outside an area.
+    """Raise ScenarioError for a position outside an area; the message states the distance from the area.
 
     key, source: names of the point and its file in messages.
     point: (2,) or (3,) m.
@@ -69,7 +69,7 @@ def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: 
 
     key, source: names of the point and its file in messages.
     point: (3,) m.
-    floor, ceiling: m AMSL.
+    floor, ceiling: lowest and highest altitude of the area, m AMSL.
     """
     amsl = f"{point[2]:.0f} m AMSL"
     if not floor <= point[2] <= ceiling:

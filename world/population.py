@@ -159,7 +159,7 @@ def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
 
 
 def _transformed(grid: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Apply an affine transformation of rasterio to x and y, numbers or arrays."""
+    """Return x and y (numbers or arrays) transformed by an affine transformation of rasterio."""
     return grid.a * x + grid.b * y + grid.c, grid.d * x + grid.e * y + grid.f
 
 
@@ -169,10 +169,12 @@ class _Window:
 
     transform: from columns and rows of the window to coordinates of the raster's reference system.
     shape: number of rows and columns.
-    first: first row and column in the raster, negative beyond its edge.
+    first: row and column of the raster at which the window starts; negative beyond the raster's edge.
     source_shape: number of rows and columns of the raster.
+    source_transform: as `transform`, but from columns and rows of the raster.
     outline: area in the raster's reference system.
     transformer: from WGS84 to the raster's reference system.
+    origin: origin of the map.
     """
 
     transform: Any
@@ -246,7 +248,7 @@ class _Window:
         return values
 
     def touched_cells(self) -> Flags:
-        """Return a mask of the cells that the area touches, (rows, columns)."""
+        """Return a mask (rows, columns), True for the cells that the area touches."""
         from rasterio.features import geometry_mask
 
         return np.asarray(
@@ -254,7 +256,7 @@ class _Window:
         )
 
     def to_lon_lat(self, columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
-        """Convert columns and rows of the window, counted between cell corners, to longitudes and latitudes, deg."""
+        """Convert columns and rows of the window to longitudes and latitudes, deg; integers are corners of cells."""
         lon, lat = self.transformer.transform(*_transformed(self.transform, columns, rows), direction="INVERSE")
         return np.asarray(lon), np.asarray(lat)
 
@@ -269,12 +271,12 @@ class _Window:
         return np.asarray(0.5e-6 * np.abs(down_x * up_y - down_y * up_x))
 
     def cell_centre(self, row: int, column: int) -> tuple[float, float]:
-        """Return latitude and longitude of a cell's centre, degrees."""
+        """Return the latitude and longitude of a cell's centre, degrees; the cell is given in the window."""
         lon, lat = self.to_lon_lat(np.array([column + 0.5]), np.array([row + 0.5]))
         return float(lat[0]), float(longitude_near(float(lon[0]), 0.0))
 
     def coverage_text(self) -> str:
-        """Describe the range of latitudes and longitudes that the raster covers, for a message."""
+        """Return the range of latitudes and longitudes that the raster covers, as text for a message."""
         rows, columns = self.source_shape
         x, y = _transformed(self.source_transform, np.array([0, columns, 0, columns]), np.array([0, 0, rows, rows]))
         lon, lat = (np.asarray(values) for values in self.transformer.transform(x, y, direction="INVERSE"))
@@ -283,9 +285,9 @@ class _Window:
         return f"the file covers latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
     def density_bands(self, densities: Floats) -> tuple[tuple[int, BaseGeometry], ...]:
-        """Return the number of each density band that occurs in the window, and its area on the map, m.
+        """Return (band number, area on the map, m) for each density band that occurs in the window, lowest first.
 
-        densities: people per km2, (rows, columns). The band of the lowest densities comes first.
+        densities: people per km2, (rows, columns); NaN for cells without data, which are in no band.
         """
         from rasterio.features import shapes
 

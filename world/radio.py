@@ -40,7 +40,7 @@ _MAX_PROFILE_PIECES = 4000
 class RadioLink:
     """Radio link of a scenario.
 
-    use: "telemetry" for the link of the ground station, "control" for the pilot's remote control.
+    use: "telemetry" for the ground station, "control" for the pilot's remote control.
     station: east and north of the station's antenna, m; None for the mission's home.
     antenna_height: height of that antenna above ground, m.
     frequency: Hz.
@@ -88,7 +88,7 @@ def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: T
 def free_space_loss(distance: float, frequency: float) -> float:
     """Return the free-space loss, dB (ITU-R P.525-4).
 
-    distance: m.
+    distance: m; below `MIN_DISTANCE_M` it is taken as `MIN_DISTANCE_M`.
     frequency: Hz.
 
     >>> round(free_space_loss(1000.0, 1e9), 2)
@@ -98,7 +98,7 @@ def free_space_loss(distance: float, frequency: float) -> float:
 
 
 def knife_edge_loss(diffraction_parameter: float) -> float:
-    """Return the loss of a knife edge, dB (ITU-R P.526-15, equation 31).
+    """Return the diffraction loss at a knife edge, dB; never below 0 (ITU-R P.526-15, equation 31).
 
     diffraction_parameter: dimensionless; positive if the edge is above the ray (equation 26).
 
@@ -124,7 +124,7 @@ def earth_bulge(distance: Floats, length: float) -> Floats:
 
 
 def line_of_sight(terrain: Terrain, station: Floats, aircraft: Floats) -> bool | None:
-    """Return True if the straight line between two antennas is clear of the ground; None if unknown.
+    """Return True if the straight line between two antennas is clear of the ground; None if the ground is unknown.
 
     station, aircraft: positions of the antennas, (3,) m.
 
@@ -139,10 +139,10 @@ def line_of_sight(terrain: Terrain, station: Floats, aircraft: Floats) -> bool |
 
 
 class PathProfile(NamedTuple):
-    """Ground between two antennas.
+    """Profile of the ground between two antennas.
 
     distances: (n,) distances from the station along the ground, m, without both ends.
-    altitudes: (n,) of the ground, m AMSL, raised by the bulge of the Earth between the antennas.
+    altitudes: (n,) altitudes of the ground, m AMSL, raised by the bulge of the Earth between the antennas.
     length: distance between the antennas along the ground, m.
     """
 
@@ -168,7 +168,7 @@ class PathLoss(NamedTuple):
 def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathProfile:
     """Return the ground profile between two antennas, sampled at the spacing of the terrain.
 
-    An aircraft straight above the station has no profile.
+    The profile is empty for an aircraft within `MIN_DISTANCE_M` of the station on the map.
 
     station, aircraft: positions of the antennas, (3,) m.
     """
@@ -240,7 +240,7 @@ def _bullington_loss(
 class LinkPoints(NamedTuple):
     """Link between the station and points of a path.
 
-    margin: (t,) loss that is left before the fade margin is used, dB; negative below it; NaN over unknown ground.
+    margin: (t,) signal above the fade margin, dB; negative below the fade margin; NaN if the ground is unknown.
     distance: (t,) slant distance from the station, m.
     diffraction_loss: (t,) dB.
     is_visible: (t,) True if the straight line is clear of the ground.
@@ -274,7 +274,7 @@ def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: F
 
 
 def link_margins(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> Floats:
-    """Return the margin of the radio link at each position of the aircraft, dB, (t,); NaN over unknown ground.
+    """Return the margin of the radio link at each position of the aircraft, dB, (t,); NaN if the ground is unknown.
 
     station: position of the station's antenna, (3,) m.
     positions: (t, 3) m.

@@ -1,4 +1,4 @@
-"""Several independent streams of random numbers from one seed."""
+"""Make independent streams of random numbers from one seed."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ _STREAM_COUNT = 3
 
 
 def stream(seed: int, number: int) -> np.random.Generator:
-    """Return the random generator of one of the independent streams that belong to a seed.
+    """Make the random generator of one of a seed's independent streams; each call starts the stream again.
 
     number: `PLANNER`, `TURBULENCE` or `NAVIGATION`.
 

@@ -103,6 +103,8 @@ _SHIPPED_TILE_TOLERANCE_DEG = 1e-5
 def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz file of heights. Raises TerrainError for any other file.
 
+    name: name of the file in messages.
+
     The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The two
     values of a pair may be in any order, except in the tile that planfly ships.
     """
@@ -230,7 +232,10 @@ def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatu
 
 
 def _determine_datum(raster: RasterFile, stated_datum: StatedDatum | None) -> HeightDatum:
-    """Return the vertical datum of a raster. Raises TerrainError if it is not usable."""
+    """Return the vertical datum of a raster, or the stated datum, which overrides it.
+
+    Raises TerrainError if it is not usable.
+    """
     try:
         return height_datum(raster.crs, stated_datum)
     except ValueError as error:
@@ -309,7 +314,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
 
 
 def _no_data_error(raster: RasterFile) -> TerrainError:
-    """Return the error for a raster without data in the area."""
+    """Make the error about a raster without data in the area."""
     return TerrainError(
         f"{raster.name}: no data in the area; the file covers {coverage_text(raster)}", file=raster.name
     )
@@ -377,9 +382,9 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
-    """Return how fast the pixel coordinates change with the map position at the centre of a box, (2, 2).
+    """Return the derivatives of pixel coordinates by map position at the centre of a box, pixels per m, (2, 2).
 
-    Row 0 has the derivatives of the column by east and by north, pixels per m; row 1 has those of the row.
+    Row 0 has the derivatives of the column by east and by north, row 1 the derivatives of the row.
     """
     centre = box.mean(axis=1)
     col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
@@ -437,7 +442,11 @@ def _outline_window(
 def _to_window_pixels(
     to_pixels: PixelMap, origin: GeoOrigin, east: Floats, north: Floats, left: int, top: int
 ) -> tuple[Floats, Floats]:
-    """Convert map positions to columns and rows, counted from a window's first pixel."""
+    """Convert map positions to fractional columns and rows, counted from a window's first pixel.
+
+    to_pixels: function from longitude and latitude to columns and rows of the raster.
+    left, top: column and row of the window's first pixel.
+    """
     lat, lon = to_geo(origin, east, north)
     col, row = to_pixels(lon, lat)
     return np.asarray(col) - left, np.asarray(row) - top
@@ -446,7 +455,8 @@ def _to_window_pixels(
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
     """Return the largest box on the map inside a raster, [[west, east], [south, north]] m.
 
-    Its sides run east and north, and its size is found to within half a percent. Raises TerrainError if no box fits.
+    The box has the proportions of the raster's extent; its size is found to within half a percent.
+    Raises TerrainError if no box fits.
 
     >>> raster = open_raster("jacksboro")
     >>> tile_bounds(raster, raster.centre).round(-2).tolist()
@@ -470,7 +480,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 def coverage_text(raster: RasterFile) -> str:
-    """Describe the range of latitudes and longitudes that a raster covers, for a message.
+    """Return the range of latitudes and longitudes that a raster covers, as text for a message.
 
     >>> coverage_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'
@@ -485,7 +495,7 @@ def _box_text(box: Floats) -> str:
 
 
 def _outside_text(raster: RasterFile, origin: GeoOrigin, box: Floats) -> str:
-    """Describe how far a box extends beyond a raster, and the largest box inside the raster, for a message.
+    """Return text on how far a box extends beyond a raster, and on the largest box inside the raster.
 
     The text names the corner of the box that is farthest outside. It is "" if the raster's coordinate system cannot
     express a corner.

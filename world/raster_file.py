@@ -1,4 +1,4 @@
-"""Opened and checked elevation file: its grid, its position on Earth and its heights, read as windows."""
+"""Elevation file that was opened and checked: its grid, its position on Earth, and a function to read its heights."""
 
 import hashlib
 from collections.abc import Callable
@@ -30,6 +30,7 @@ HIGHEST_GROUND_M = 9000.0
 class RasterFile:
     """Elevation file that was opened and checked; its heights are not read yet.
 
+    name: name in messages.
     to_pixels: function from longitude and latitude (deg) to fractional (col, row) of pixel centres.
     to_lon_lat: inverse of `to_pixels`.
     shape: (rows, cols).

@@ -51,7 +51,7 @@ OnBytes = Callable[[int], None]
 
 
 class _IncompleteAnswer(Exception):
-    """An answer does not contain the requested bytes; the message says why."""
+    """Error for an answer that does not contain the requested bytes; the message states the reason."""
 
 
 @dataclass(slots=True)
@@ -60,7 +60,8 @@ class RemoteFile:
 
     size: size in bytes.
     version: its ETag or its time of change; "" if the server states neither.
-    parts: the parts that the copy contains, [begin, end), and the SHA-256 of each.
+    copy: path of the copy.
+    parts: SHA-256 of each part that the copy contains, keyed by its bytes [begin, end).
     """
 
     url: str
@@ -104,7 +105,7 @@ class RemoteFile:
                     time.sleep(_PAUSE * 2.0**attempt)
 
     def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
-        """Fetch [begin, end) into the copy; fetch the whole file if the server has no range requests.
+        """Fetch the bytes [begin, end) into the copy; fetch the whole file if the server has no range requests.
 
         Raises errors of the connection, and _IncompleteAnswer if the server sends other or fewer bytes. The bytes that
         were received are kept in the copy.
@@ -201,14 +202,14 @@ def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.cl
 
 
 class _TimedHead(http.client.HTTPConnection):
-    """Connection whose answer's head must arrive in time; a socket's timeout starts again with each byte."""
+    """Connection with a time limit for all headers of an answer; a socket's timeout starts again with each byte."""
 
     def getresponse(self) -> http.client.HTTPResponse:
-        """Return the server's answer once its head has arrived. Raises OSError if the head does not arrive in time."""
+        """Return the server's answer once its headers have arrived. Raises OSError if they do not arrive in time."""
         is_late = threading.Event()
 
         def shut_down_connection() -> None:
-            """Shut down the connection, because the head of the answer is late."""
+            """Shut down the connection, because the headers of the answer are late."""
             is_late.set()
             with contextlib.suppress(OSError):
                 self.sock.shutdown(socket.SHUT_RDWR)
@@ -232,18 +233,18 @@ class _TimedHead(http.client.HTTPConnection):
 
 
 class _TimedHeadOverTls(_TimedHead, http.client.HTTPSConnection):
-    """Connection as `_TimedHead`, over TLS."""
+    """The same connection over TLS."""
 
 
 class _HttpHandler(urllib.request.HTTPHandler):
     def http_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
-        """Open an http address with a time limit for the head of the answer."""
+        """Open an http address with a time limit for the headers of the answer."""
         return self.do_open(_TimedHead, req)
 
 
 class _HttpsHandler(urllib.request.HTTPSHandler):
     def https_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
-        """Open an https address with a time limit for the head of the answer."""
+        """Open an https address with a time limit for the headers of the answer."""
         return self.do_open(_TimedHeadOverTls, req)
 
 
@@ -299,7 +300,7 @@ def _is_temporary(error: Exception) -> bool:
 
 
 def _error_text(error: Exception) -> str:
-    """Return the reason of a failed request as text."""
+    """Return the reason why a request failed, as one line of text."""
     if isinstance(error, urllib.error.HTTPError):
         return f"the server answers {error.code} {error.reason}"
     reason = getattr(error, "reason", None) or error
@@ -312,7 +313,7 @@ def _notes_path(copy: Path) -> Path:
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Return the parts [begin, end) of a copy with their SHA-256, as its notes list them, without damaged parts.
+    """Return the SHA-256 of each undamaged part [begin, end) of a copy, as listed in the copy's notes file.
 
     size: size of the copy, bytes. The result is empty if the notes are missing or damaged.
     """

@@ -1,4 +1,4 @@
-"""Clock that stops while this process does not run: during a laptop's sleep, after Ctrl-Z, or in a debugger."""
+"""Clock that stops while this process is stopped: during a laptop's sleep, after Ctrl-Z, or in a debugger."""
 
 import time
 from collections.abc import Callable
@@ -8,7 +8,7 @@ MAX_STEP_S = 1.0
 
 
 class RunningClock:
-    """Seconds of real time that this process has run since the clock was made.
+    """Clock that returns the real time for which this process has run, s, since the clock was made.
 
     The clock must be read at least every `MAX_STEP_S` s, because a longer step counts as a pause of the process.
     Timeouts and playback then continue after the pause.

@@ -28,7 +28,7 @@ from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean, toml_text, write_atomically
 from world.forecast.forecast import Forecast
-from world.forecast.scenario_wind import ForecastSite, forecast_wind, scenario_forecast
+from world.forecast.scenario_wind import ForecastSite, forecast_wind, read_table_forecast
 from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
 from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo
 from world.html_table import html_table
@@ -77,7 +77,7 @@ _Class = TypeVar("_Class")
 
 
 def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
-    """Decorate the class `Scenario` so that wrong arguments raise an ArgumentError that recommends `make_scenario`."""
+    """Decorate `Scenario` so that wrong constructor arguments raise an ArgumentError that names `make_scenario`."""
     initialise = scenario_class.__init__
 
     @wraps(initialise)
@@ -101,19 +101,19 @@ class Scenario:
 
     spec: the checked file, from which `scenario_from_spec` makes the same scenario again.
     origin: geographic position of east = north = 0.
-    bounds: (2, 2) [[east0, east1], [north0, north1]].
-    floor, ceiling: m AMSL.
-    start, destination: (3,).
-    start_course, destination_course: rad or None.
-    terrain: None if no terrain was given (an external mission).
+    bounds: area, (2, 2) [[west, east], [south, north]].
+    floor, ceiling: lowest and highest altitude, m AMSL.
+    start, destination: (3,) east, north, altitude AMSL.
+    start_course, destination_course: rad clockwise from north; None for any course.
+    terrain: ground heights; None if no terrain was given (an external mission).
     limits, planner, flight: the file's tables of these names.
     zones: airspace zones to keep out of or to stay in.
-    external: True if made around a mission file without a scenario: the bounds are then not a limit, and the empty
-    threats mean unknown threats.
+    external: True if made around a mission file without a scenario: the bounds are then not a limit, and an empty list
+    of threats means that threats are unknown.
     home: (3,) position of the aircraft on the ground before the flight; None if not stated.
     launch, landing: launch at home and landing strip; None for a flight that begins, or ends, in the air.
-    returns: requirements and settings of returns; None without any.
-    link: radio link to judge; None without any.
+    returns: requirements on returns to launch, and RTL settings; None if the scenario states none.
+    link: radio link to judge; None if the scenario states none.
     """
 
     name: str
@@ -141,7 +141,7 @@ class Scenario:
     link: RadioLink | None = None
 
     def __post_init__(self) -> None:
-        """Check the types, and lock the arrays."""
+        """Check the types of the fields, and replace the arrays by read-only copies."""
         for name, field_class in _FIELD_CLASSES.items():
             value = getattr(self, name)
             if not isinstance(value, field_class) and (value is not None or name != "terrain"):
@@ -186,7 +186,7 @@ class Scenario:
 
     @property
     def geo_map(self) -> PolyMap | None:
-        """Map from east and north (m) to longitude and latitude (deg), for a forecast; None without a forecast."""
+        """Polynomial map from east and north (m) to longitude and latitude (deg); None without a forecast."""
         if self.wind.field is None:
             return None
 
@@ -385,8 +385,8 @@ def scenario_from_spec(
 
     source: name of the file in messages.
     base: folder of relative paths.
-    terrain: an elevation file that replaces the scenario's own.
-    ground: terrain that is already loaded (from a log).
+    terrain: an elevation file that replaces the scenario's terrain; None to keep the scenario's terrain.
+    ground: terrain that is already loaded (from a log); None to read it.
     external: see `Scenario`.
     is_stored: True for the scenario of a log, which has the wind and the ground of its flight; no forecast is read.
     Raises ScenarioError, TerrainError and ForecastError for a file that is missing or has a fault.
@@ -418,7 +418,7 @@ def scenario_from_spec(
     if raster is not None:
         # The terrain extends to the ground station of the link if the station lies outside the area.
         require_covered(raster, origin, bounds)
-        box = _box_with(raster, origin, bounds, station_position(spec.link, origin))
+        box = _extend_box(raster, origin, bounds, station_position(spec.link, origin))
         ground = read_terrain(raster, origin, box, GROUND_BUFFER)
     elif ground is None and spec.terrain.kind == "flat":
         ground = make_flat_terrain(bounds, float(spec.terrain.amsl_m or 0.0), 5 * GROUND_BUFFER)
@@ -503,11 +503,11 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file or files; return them as one raster, and a [terrain] table that identifies them.
+    """Open a scenario's elevation file or files as one raster; also return a [terrain] table that identifies them.
 
     base: folder of relative paths.
 
-    The table has absolute paths and the SHA-256. Raises ScenarioError if the stated SHA-256 differs.
+    The returned table has absolute paths and the SHA-256. Raises ScenarioError if the stated SHA-256 differs.
     """
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
     path_text = ", ".join(paths)
@@ -584,8 +584,8 @@ def _assemble_scenario(
     )
 
 
-def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
-    """Return an area that is extended to contain a position, if the elevation file has pixels there.
+def _extend_box(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
+    """Return an area extended to contain a position, or unchanged if the elevation file does not cover the position.
 
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
     position: east and north, m; None to return the area unchanged.
@@ -602,7 +602,7 @@ def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: t
 
 
 def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenario:
-    """Return a scenario whose terrain extends to a position, m, if its elevation file has data there.
+    """Return a scenario whose terrain extends to a position (east, north, m), if its elevation file has data there.
 
     The scenario itself is returned if its terrain already covers the position, or if its terrain is not from an
     elevation file. Raises TerrainError or ScenarioError for a file that cannot be read or that has changed.
@@ -611,7 +611,7 @@ def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenari
     if terrain is None or table.kind != "dem" or math.isfinite(float(terrain.height(*position))):
         return scenario
     raster, _ = _open_terrain(table, scenario.name, None)
-    box = _box_with(raster, scenario.origin, scenario.bounds, position)
+    box = _extend_box(raster, scenario.origin, scenario.bounds, position)
     if box is scenario.bounds:
         return scenario
     extended_terrain = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
@@ -666,9 +666,9 @@ def with_amsl_endpoints(spec: dict[str, Any], start: Floats, destination: Floats
 
 
 def with_ground(scenario: Scenario, ground: Terrain) -> Scenario:
-    """Return a scenario whose real ground differs from the ground of the map.
+    """Return a scenario with another ground, such as the real ground that differs from the map's terrain.
 
-    ground: the real ground.
+    ground: the other ground.
 
     Objects on the ground move with it: home, and threats and rally points without an altitude AMSL. Heights above
     ground of zones and of the link's station are measured from the new `Scenario.terrain`. Start, destination and
@@ -732,7 +732,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 
 
 def with_forecast(scenario: Scenario, forecast: str, source: str = "") -> Scenario:
-    """Return a scenario with the wind of a weather forecast from the scenario's time of flight on.
+    """Return a scenario with the wind of a weather forecast, from its time of flight onwards.
 
     forecast: file that `world.forecast.read_forecast` reads.
     source: beginning of messages about the file.
@@ -759,8 +759,8 @@ def without_forecast(scenario: Scenario) -> Scenario:
     return replace(scenario, spec=spec, wind=replace(scenario.wind, field=None, forecast=None))
 
 
-def forecast_of_scenario(scenario: Scenario) -> Forecast:
-    """Read the forecast that a scenario's [wind] names, for the area of its map.
+def read_scenario_forecast(scenario: Scenario) -> Forecast:
+    """Read the forecast that a scenario's [wind] table names, for the area of the scenario.
 
     Raises ForecastError for a file that cannot be used.
     """
@@ -768,7 +768,7 @@ def forecast_of_scenario(scenario: Scenario) -> Forecast:
     if scenario.terrain is not None:
         ground = float(scenario.terrain.height(scenario.start[0], scenario.start[1]))
     start_ground = float(scenario.start[2]) if math.isnan(ground) else ground
-    return scenario_forecast(scenario.spec.wind, scenario.origin, scenario.bounds, start_ground)
+    return read_table_forecast(scenario.spec.wind, scenario.origin, scenario.bounds, start_ground)
 
 
 def _with_forecast_wind(scenario: Scenario) -> Scenario:
@@ -779,11 +779,13 @@ def _with_forecast_wind(scenario: Scenario) -> Scenario:
     """
     if scenario.spec.wind.forecast is None or scenario.spec.at is None:
         return scenario
-    return in_forecast_member(scenario, forecast_of_scenario(scenario), 0)
+    return with_forecast_member(scenario, read_scenario_forecast(scenario), 0)
 
 
-def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
-    """Return a scenario with the wind of one member of its forecast, from the time of flight on.
+def with_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
+    """Return a scenario with the wind of one member of its forecast, from its time of flight onwards.
+
+    member: index of the member, from 0.
 
     Raises ForecastError if the forecast does not cover the start and the destination at this time.
     """
@@ -858,8 +860,9 @@ def without_ground_phases(scenario: Scenario) -> Scenario:
 def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
     """Return a scenario with additional zones; zones far from its area are left out.
 
+    tables: the additional zones.
     source: name of the zones in messages.
-    notes: notes on reading their file.
+    notes: notes on reading their file, which the scenario keeps.
 
     Raises ScenarioError for an invalid shape, for a level above ground without terrain, and for more zones than a
     scenario may have. Also raises ScenarioError if the start or the destination violates a zone, except in an external
@@ -915,8 +918,8 @@ def with_threats(
     """Return a scenario with additional threats.
 
     added_threats: values of each threat, by the keys of [[threats]].
-    source: name of the threats in messages.
-    preceding: tables to insert before the added threats.
+    source: origin of the threats in messages, such as "--threat".
+    preceding: tables of threats to insert before the added threats.
 
     A scale that is not given follows from its radius. The ratio of scale to radius is then the median ratio of the
     scenario's threats, or by default a quarter for kill and a third for detection. Raises ScenarioError for a threat
@@ -958,7 +961,7 @@ def with_threats(
 def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
     """Return a scenario with changed keys of [planner].
 
-    source: name of the change in messages.
+    source: origin of the values in messages, such as "--seed".
     changes: values by key.
 
     Raises ScenarioError for a value that is not allowed in a scenario file.

@@ -1,4 +1,4 @@
-"""Make a commented scenario file to start from, for two positions and their terrain, with commented-out examples."""
+"""Make a commented scenario file to start from, for two positions and their terrain, with examples in comments."""
 
 import json
 import math
@@ -54,8 +54,9 @@ class Draft:
 
     terrain: path of the elevation file as the scenario states it; None for flat ground at mean sea level.
     start, destination: positions at `height` m above ground.
-    box: [[east0, east1], [north0, north1]] m about `origin`.
-    ceiling: m above mean sea level.
+    origin: origin of the map.
+    box: area, [[west, east], [south, north]] m from `origin`.
+    ceiling: ceiling of the area, m AMSL.
     aircraft, autopilot: see [flight].
     version: release of the autopilot, None for the newest.
     airspeed: cruise speed of the aircraft, m/s.
@@ -76,7 +77,7 @@ class Draft:
 
     @property
     def clearance(self) -> float:
-        """Clearance of a path above the ground, m."""
+        """Required clearance of a path above the ground, m."""
         return min(_CLEARANCE_M, _CLEARANCE_FRACTION * self.height)
 
 
@@ -119,7 +120,7 @@ def make_draft(
     margin = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
     highest_ground, bounds = 0.0, _enclosing_box(endpoints, margin)
     if raster is not None:
-        bounds, highest_ground = _survey_ground(
+        bounds, highest_ground = _find_covered_area(
             raster, origin, {"start": start, "destination": destination}, endpoints, margin
         )
     ceiling = math.ceil((highest_ground + height + _HEADROOM_M) / _CEILING_STEP_M) * _CEILING_STEP_M
@@ -129,7 +130,7 @@ def make_draft(
     )
 
 
-def _survey_ground(
+def _find_covered_area(
     raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
     """Find an area around start and destination that has elevation data, and the highest ground in it, m.
@@ -171,9 +172,7 @@ def _survey_ground(
 
 
 def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
-    """Return the box around two positions with a margin (m) on all sides.
-
-    Returns (2, 2) m: rows east and north, columns minimum and maximum.
+    """Return the box around two positions with a margin (m) on all sides: [[west, east], [south, north]], (2, 2) m.
 
     endpoints: east and north of each position, (2, 2) m.
     """

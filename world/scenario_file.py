@@ -70,7 +70,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def checked_table(make_table: Callable[[], Table], source: str) -> Table:
-    """Call a function that makes a table, and return the table; raise pydantic's error as a ScenarioError.
+    """Return the table that a function makes; raise a pydantic error in it as a ScenarioError.
 
     source: name of the file in messages.
     """
@@ -218,7 +218,9 @@ _EXPECTED_VALUES = {
 
 
 def expected_values(error_entry: Mapping[str, Any], container: str) -> str:
-    """Return the expected values of a field, from one entry of a pydantic error's list; pydantic's words if unknown.
+    """Return the expected values of a field as text; for an unknown kind of error, return pydantic's message.
+
+    error_entry: entry of the list of a pydantic error.
 
     container: name of keys with values, as in `first_fault`.
     """

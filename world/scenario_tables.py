@@ -1,4 +1,4 @@
-"""Tables of a scenario file as pydantic models: unknown keys, NaN and out-of-range values are rejected.
+"""Tables of a scenario file as pydantic models, which reject unknown keys, NaN and out-of-range values.
 
 The models mirror the TOML key for key.  `world.scenario_file` reads a file into them, and `world.scenario` turns them
 into a `Scenario`.
@@ -104,7 +104,7 @@ def _check_latitude(corner: list[float]) -> list[float]:
 
 
 def _make_text_check(parse: Callable[[str], object]) -> Callable[[str], str]:
-    """Make a function that returns a text which a parser accepts, and raises its ValueError for another text."""
+    """Make a validator that returns a text unchanged, or raises the ValueError with which a parser rejects it."""
 
     def check(text: str) -> str:
         """Return the text; raise ValueError if the parser does not accept it."""
@@ -165,7 +165,7 @@ class ZoneTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_shape(self) -> "ZoneTable":
-        """Raise ValueError unless exactly one shape is stated."""
+        """Raise ValueError unless exactly one shape is stated, completely and with at most `MAX_CORNERS` corners."""
         shapes = ("polygon_m", "polygon_deg", "rings_m", "rings_deg", "radius_m")
         stated_keys = [key for key in shapes if getattr(self, key) is not None]
         if len(stated_keys) != 1:
@@ -495,7 +495,7 @@ class FlightTable(ScenarioTable):
     @field_validator("autopilot")
     @classmethod
     def _replace_old_name(cls, name: str | None) -> str | None:
-        """Return the present name of an autopilot."""
+        """Return the present name of an autopilot in place of its old name."""
         return OWN_GUIDANCE if name == _OLD_OWN_GUIDANCE else name
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""Suppress what a library prints on standard output, one thread at a time."""
+"""Suppress the output that a library prints on standard output, in one thread at a time."""
 
 import contextlib
 import io
@@ -18,11 +18,11 @@ _SILENCE_LOCK = threading.RLock()
 
 @contextmanager
 def silence() -> Iterator[Callable[[], str]]:
-    """Suppress standard output in this context, for libraries that print unasked, such as JSBSim and pyulog.
+    """Suppress standard output in this block, for libraries that print unasked, such as JSBSim and pyulog.
 
-    A library's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. The context yields a function
-    that returns the output of both. Both outputs belong to the process, so only one thread at a time suppresses them.
-    What other threads print meanwhile is not suppressed.
+    A library's C++ code writes to file descriptor 1, its Python code to ``sys.stdout``. Yields a function that returns
+    the suppressed output of both. Both belong to the whole process, so only one thread at a time suppresses them. Text
+    that other threads print with Python meanwhile is not suppressed.
     """
     with _SILENCE_LOCK:
         sys.stdout.flush()

@@ -31,10 +31,10 @@ class Terrain:
 
     heights: (rows, cols) float32 m at pixel centres, NaN if there is no data.
     to_pixel: map (east, north) to fractional (col, row).
-    spacing: smaller spacing of the pixels, of both directions, m.
+    spacing: spacing of the pixels, m; the smaller one if the two directions differ.
     source, sha256: name and hash of the elevation file.
-    datum: vertical datum that the file states.
-    vertical_error: error that the file states, m, or None.
+    datum: description of the vertical datum.
+    vertical_error: stated error of the heights, m; None if not stated.
     """
 
     heights: Heights
@@ -46,7 +46,7 @@ class Terrain:
     vertical_error: float | None = None
 
     def __post_init__(self) -> None:
-        """Lock the raster."""
+        """Replace the heights by a read-only array."""
         heights = np.ascontiguousarray(self.heights, dtype=np.float32)
         if heights.flags.writeable:
             heights = heights if heights is not self.heights else heights.copy()
@@ -58,7 +58,7 @@ class Terrain:
         return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Return the ground height at map positions of any shape, m AMSL; NaN without data or off the raster."""
+        """Return the ground height at map positions (m, any shape), m AMSL; NaN without data or off the raster."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
         return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
@@ -76,7 +76,7 @@ class Terrain:
 
 
 def _rebuild_terrain(heights: Heights, *other_fields: Any) -> Terrain:
-    """Make a terrain from unpickled heights, which are locked again, and its other fields in order."""
+    """Make a terrain from unpickled heights, made read-only again, and its other fields in order."""
     heights.setflags(write=False)
     return Terrain(heights, *other_fields)
 
@@ -222,7 +222,7 @@ def _clearance_from_pixel(
 
 @inlined
 def _next_crossing(start: float, step: float, fraction: float) -> float:
-    """Return the next larger fraction at which start + fraction * step is an integer; inf if there is none."""
+    """Return the next fraction above a given one at which start + fraction * step is an integer; inf if none."""
     if step == 0.0:
         return math.inf
     position = start + fraction * step

@@ -52,14 +52,14 @@ class Box(NamedTuple):
 
 
 class CutTerrain(NamedTuple):
-    """Summary of the written file.
+    """Terrain of an area that was written to a file.
 
     file: the GeoTIFF.
-    shape: its rows and columns.
-    tiles: names of its source tiles.
+    shape: its number of rows and columns.
+    tiles: names of the tiles or files that it was made from.
     absent: degrees (south-west corners) for which the server has no tile.
-    empty: pixels without data.
-    fetched: bytes received from the server.
+    empty: number of pixels without data.
+    fetched: number of bytes received from the server.
     """
 
     file: Path
@@ -162,7 +162,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
 
     server: address of the folder with the tiles.
     cache: folder for the fetched parts.
-    progress: progress callback.
+    progress: function that is called with the work done, the total and a remark.
     sea: True if one-degree squares without a tile are sea, at 0 m; otherwise they have no data.
 
     Where tiles of different pixel size meet (at latitudes of 50, 60, 70, 75, 80 and 85 degrees), the coarser tiles are
@@ -252,7 +252,7 @@ def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]
 
 
 class _UnreadableError(Exception):
-    """A copy is not a GeoTIFF, or has a block that cannot be unpacked."""
+    """Error for a copy that is not a GeoTIFF, or has a block that cannot be unpacked."""
 
 
 def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
@@ -288,8 +288,9 @@ _PIXEL_TOLERANCE = 1e-3
 
 
 class _PlacedTile(NamedTuple):
-    """Tile with its grid of longitudes and latitudes.
+    """One-degree tile with its grid of longitudes and latitudes.
 
+    raster: the tile.
     west, north: outer edges, deg; the longitude is shifted by multiples of 360 degrees to match the area.
     dx, dy: size of a pixel, deg.
     """

@@ -1,4 +1,4 @@
-"""Threats: missiles and radars as spheres about a position."""
+"""Threats: missiles and radars, each a sphere about a position."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,9 @@ from world.arrays import Floats
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Threats:
-    """m air-defence units; a radius of 0 means that the unit has no missile, or no radar.
+    """Air-defence units (m of them); a radius of 0 means that a unit has no missile, or no radar.
 
-    names: m labels of `threat_label`.
+    names: m labels, made by `threat_label`.
     position: (m, 3) east, north, up in m.
     kill_radius, detection_radius: (m,) m, the paper's R_PKmax and R_PRDmax.
     kill_scale, detection_scale: (m,) m, the paper's gamma and delta (eq. 9 and 10).
@@ -25,7 +25,7 @@ class Threats:
     detection_scale: Floats
 
     def __post_init__(self) -> None:
-        """Lock the arrays."""
+        """Replace the arrays by read-only copies."""
         for name in ("position", "kill_radius", "detection_radius", "kill_scale", "detection_scale"):
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)

@@ -46,8 +46,8 @@ class Wind:
     gradient: increase of the speed in m/s per metre of altitude, 1/s; the speed is never below 0.
     turbulence: level of MIL-F-8785C, see `W20`.
     seed: seed of the turbulence; None for the seed of the flight.
-    field: deviation of a forecast's wind from this mean wind, with times in s after take-off, which the flight adds;
-        None for a wind that is the same everywhere.
+    field: deviation of a forecast's wind from this mean wind, which a flight adds to the mean wind; its times are s
+        after take-off. None for a wind without such a deviation.
     forecast: the forecast that the wind was made from; None for a stated wind.
     """
 
@@ -87,7 +87,7 @@ class Wind:
         return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
 
     def max_speed_at(self, amsl: Floats) -> float:
-        """Return the highest mean wind speed (m/s) at any of some altitudes (m AMSL)."""
+        """Return the highest mean wind speed (m/s) at the given altitudes (m AMSL)."""
         return max(math.hypot(*self.velocity_at(float(altitude))) for altitude in amsl)
 
     def components_on_course(self, course: float, amsl: float) -> tuple[float, float]:

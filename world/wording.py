@@ -19,7 +19,7 @@ def count_text(count: int, noun: str) -> str:
 
 
 def count_range_text(counts: Sequence[int], noun: str) -> str:
-    """Return the range of several counts of a noun, as text.
+    """Return the smallest and the largest of several counts with their noun, as text.
 
     >>> count_range_text([12, 6, 10], "flight"), count_range_text([1, 1], "flight")
     ('6 to 12 flights', '1 flight')
@@ -53,7 +53,8 @@ def format_number(value: float | None, *, signed: bool = False, digits: int | No
 
     None and non-finite values become an en dash.
 
-    digits: number of decimals, for columns in which all numbers need the same number.
+    signed: True to show the sign of a positive number.
+    digits: number of decimals, for a column of numbers with equal decimals; None to choose it by the size of the value.
     """
     if value is None or not math.isfinite(value):
         return NOTHING
@@ -70,7 +71,7 @@ def format_number(value: float | None, *, signed: bool = False, digits: int | No
 
 
 def format_quantity(value: float | None, unit: str) -> str:
-    """Return a number and its unit as text, with radians shown as degrees."""
+    """Return a number and its unit as text, with radians shown as degrees; an en dash if the number is None or NaN."""
     shown_value, name = display_value(value, unit)
     text = format_number(shown_value)
     if text == NOTHING or not name:

@@ -9,7 +9,7 @@ from logs.views.charts import Label, Layer, shorten
 from logs.views.failures import Failures, route_samples, threat_radius
 from world.airspace.zone_kernels import edge_distance, zone_records
 from world.airspace.zones import Zone, ZoneLevel
-from world.airspace.zones_on_map import level_heights, zone_rings
+from world.airspace.zones_on_map import level_altitudes, zone_rings
 from world.arrays import Floats
 from world.threats import Threats
 
@@ -340,8 +340,8 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
     records, cuts = zone_records(zones), []
     for z, zone in enumerate(zones):
         is_over_zone = np.array([edge_distance(records, z, east, north) <= 0.0 for east, north, _ in points])
-        floor = np.clip(level_heights(zone.floor, terrain, min_altitude), min_altitude, max_altitude)
-        ceiling = np.clip(level_heights(zone.ceiling, terrain, max_altitude), min_altitude, max_altitude)
+        floor = np.clip(level_altitudes(zone.floor, terrain, min_altitude), min_altitude, max_altitude)
+        ceiling = np.clip(level_altitudes(zone.ceiling, terrain, max_altitude), min_altitude, max_altitude)
         bands = [(floor, ceiling, is_over_zone)]
         if zone.kind == "inclusion":
             whole_range = np.full(len(points), min_altitude), np.full(len(points), max_altitude)

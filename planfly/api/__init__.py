@@ -1,1 +1,1 @@
-"""Functions of `import planfly`, each of which is loaded with its first use and returns frozen data."""
+"""Functions of the package `planfly`; each is loaded at its first use, and returns read-only data."""

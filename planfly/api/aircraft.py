@@ -29,7 +29,7 @@ class AircraftNumbers:
 
     aircraft: metadata of the aircraft.
     model_sha256: SHA-256 of the JSBSim model.
-    envelope: climb and descent limits for each airspeed and altitude.
+    envelope: limits of climb and descent, by airspeed and altitude.
     trims: trimmed level flight at each airspeed.
     modes: modes of motion, keyed by airspeed, m/s.
     cruise: modes of motion at cruise speed.
@@ -155,7 +155,7 @@ def new_aircraft(
 def describe_aircraft(
     name: str | Path, *, motor_braking: bool = False, out: str | Path | None = None, overwrite: bool = False
 ) -> AircraftNumbers:
-    """Compute trims, modes, envelope and step responses of an aircraft, and draw them.
+    """Compute trims, modes, envelope and step responses of an aircraft, and draw them if a folder is named.
 
     name: name of a built-in aircraft, or a folder.
     motor_braking: True to let the motor brake in descents.
@@ -208,9 +208,11 @@ def describe_aircraft(
 
 
 def _load_aircraft(name: str | Path) -> Aircraft:
-    """Load an aircraft by its name or folder.
+    """Load an aircraft by its built-in name or from its folder.
 
-    Raises PlanflyError for an unknown name or a missing folder.
+    name: a `Path`, or a text with a slash, is a folder.
+
+    Raises PlanflyError for an unknown name, and for a folder that is missing or has no aircraft.
     """
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):

@@ -1,4 +1,4 @@
-"""Decorate the functions of the public API: check their arguments, and compile the kernels that they need."""
+"""Decorator for functions of the public API: check their arguments, and compile the kernels that they need."""
 
 import functools
 import inspect
@@ -38,7 +38,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
     """
 
     def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-        """Extend a function's signature by its options, and wrap the function."""
+        """Return the function with checks and compilation before each call, and with its options in its signature."""
         signature, defaults = inspect.signature(function), dict[str, object]()
         *parameters, last = signature.parameters.values()
         if last.kind is last.VAR_KEYWORD:

@@ -65,9 +65,7 @@ from world.wording import count_text
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again.
-
-    Its result is the same as in the campaign.
+    """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again, with the same outcome.
 
     row: outcome, reason for the end, and failed rules.
     log: the file of the flight log.
@@ -78,9 +76,9 @@ class CampaignFlight:
 
 
 def _with_stored_options(options: CampaignOptions | WindsOptions, directory: OutputDirectory) -> CampaignOptions:
-    """Add the options of a resumed campaign, from its table, to the options that the user gave.
+    """Return the given options, completed by the stored options of a campaign that is resumed.
 
-    An option that the user gave replaces the stored option.
+    A given option replaces the stored option. If no campaign is resumed, the options are returned unchanged.
     """
     stored = read_stored_settings(directory.folder / directory.table).get("options", {}) if directory.resume else {}
     # A wind is stored as a list.
@@ -118,9 +116,9 @@ def _open_base(
 
 
 def _name_command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
-    """Return the target of a campaign as text for the command line that repeats the campaign.
+    """Return the text that names a campaign's target in the command line that repeats the campaign.
 
-    The text of a `Plan` is the path of its file in `folder`.  A `Scenario` is written to a file there.
+    For a `Plan`, it is the path of the plan's file in `folder`.  A `Scenario` is written to a file there.
     """
     if isinstance(target, Plan):
         return str(folder / "plan.json")
@@ -128,9 +126,9 @@ def _name_command_line_target(target: Plan | Scenario | str | Path, folder: Path
 
 
 def _write_scenario_file(scenario: Scenario, folder: Path) -> str:
-    """Write a scenario into a campaign's folder, for the command line that repeats it; return the path.
+    """Write a scenario into a campaign's folder, and return its path for the command line that repeats the campaign.
 
-    For a scenario made around a mission, nothing is written, and its name is returned.
+    A scenario made around a mission cannot be written; its name is returned.
     """
     if scenario.external:
         return scenario.name
@@ -164,7 +162,7 @@ def answer_command_line(
 ) -> str:
     """Return the command line that repeats a search for a window, a battery or a ground risk class.
 
-    Returns "" if target or scenario is a Python object, because a command line cannot name it.
+    Returns "" if the target or the scenario is a Python object, which a command line cannot name.
 
     command: name of the command, such as "battery".
     search_options: options of this command only, by name.
@@ -180,11 +178,13 @@ def answer_command_line(
 
 
 def make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
-    """Check the number of workers, the scheduler and the seed, and return the workers.
-
-    Raises PlanflyError for invalid arguments, before anything is planned.
+    """Check the arguments that concern worker processes, and return the workers.
 
     count: number of processes on this machine; None for one per core.
+    scheduler: address of a dask scheduler; None to fly on this machine.
+    seed: seed of the campaign, which is only checked.
+
+    Raises PlanflyError for invalid arguments, and MissingExtraError if dask is not installed.
     """
     end_repeated_call()
     check_arguments(workers=count, seed=seed)
@@ -224,7 +224,7 @@ def continued_goal(
 
 
 def _warn_of_too_few_flights(goal: Goal) -> None:
-    """Warn if a campaign has too few flights to show its target, even if all of them are flyable."""
+    """Print a warning if a campaign has too few flights to show its target even if all are flyable."""
     estimator, best = Estimator(goal), Tally(goal.flights, 0)
     if estimator.estimate(best).answer == "undecided":
         needed_text = count_text(estimator.deciding_flights(best) or MAX_DECIDING_FLIGHTS, "flight")
@@ -252,17 +252,16 @@ def campaign(
     target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
     .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
-    flights: number of flights; None takes 300, or, with ``prove``, at most 5,000; for a resumed campaign its earlier
-    number.  Without ``prove`` and ``at_least``, a resumed campaign keeps its earlier target, and without other options
-    its earlier ones.
+    flights: number of flights; None takes 300, or at most 5,000 with ``prove``.
     prove: a probability; flights are flown until they show whether the mission reaches it.
     at_least: a probability to judge after all flights.  Only one of the two may be given.
-    confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.
+    confidence: confidence level of each bound; None takes 0.95.
     seed: seed of plan and draws.  For the other options, see `planfly.fly`.
     workers: number of processes on this machine; None for one per core.
     scheduler: address of a running dask scheduler, whose workers then fly.
     out: folder of the campaign's files; None keeps no files.
-    resume: True continues the campaign in the folder.  overwrite: True replaces the campaign.
+    resume: True continues the campaign in the folder; arguments that are not given keep their earlier values.
+    overwrite: True replaces the campaign in the folder.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
     Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
 
@@ -332,7 +331,7 @@ def campaign_flight(
 @requires_extra("campaigns")
 @checks_types
 def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparison:
-    """Compare two campaigns: their probabilities, the difference, rules that fail more often, options.
+    """Compare two campaigns: their probabilities, the flights that fail each rule, and their options.
 
     If the flights of both have the same draws (the same seed, dispersions and numbers of flights), they are compared in
     pairs.
@@ -428,7 +427,7 @@ def winds(
 
 
 def open_sample(target: Plan | Scenario | str | Path, options: SampleOptions) -> CampaignBase:
-    """Open the mission of a search whose flights are not stored; for a scenario, plan a path first.
+    """Open the mission for a search whose flights are not stored on disk; for a scenario, plan a path first.
 
     Raises PlanflyError for bad input.
     """
@@ -453,7 +452,7 @@ def battery(
     overwrite: bool = True,
     **options: Unpack[BatteryOptions],
 ) -> BatteryResult:
-    """Find the smallest battery with which mission and returns keep the reserve with a probability.
+    """Find the smallest battery that keeps its reserve in mission and returns with a given probability.
 
     The flights vary as in `planfly.campaign`.  From each flight, returns to launch are simulated as in
     `planfly.returns`.

@@ -102,7 +102,7 @@ def _make_absolute_path(path: str | Path, *, is_name: bool) -> str:
 
 
 def _make_relative_path(folder: Path, path: str) -> str:
-    """Return an absolute path relative to a folder; a name is returned unchanged."""
+    """Convert an absolute path to a path relative to a folder; a name is returned unchanged."""
     if not Path(path).is_absolute():
         return path
     relative = os.path.relpath(path, absolute_path(folder))

@@ -81,9 +81,9 @@ class ExportedFiles:
 
 @dataclass(frozen=True, slots=True)
 class _SourceContent:
-    """Content of the source of an export.
+    """Content of the plan, mission or log that is exported.
 
-    mission: items of the mission, and the threats of a plan as fences.
+    mission: the mission; its fences include the threats of a plan.
     name: title of a map.
     lines: lines on a map, keyed by their meaning; empty if no target is a map.
     zones: zones on a map; empty if no target is a map.
@@ -93,7 +93,8 @@ class _SourceContent:
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
     has_own_parameters: True if the parameters are those of a log, a plan, a scenario or a parameter file.
-    airspeed, aircraft: airspeed until the mission sets one, m/s, and its aircraft; None and "" if no target needs them.
+    airspeed: airspeed until the mission sets one, m/s; None if no target needs it.
+    aircraft: name of the aircraft with this airspeed; "" if no target needs it.
     """
 
     mission: Mission
@@ -111,7 +112,7 @@ class _SourceContent:
     aircraft: str = ""
 
     def of_plan(self) -> "_SourceContent":
-        """Return the content with "the plan" as its source in messages, instead of the plan's temporary file."""
+        """Return the content with the name "the plan" in messages, in place of the plan's temporary file."""
         return replace(self, mission=replace(self.mission, source="the plan"))
 
 
@@ -136,7 +137,7 @@ def export(
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     scenario: scenario of a mission or plan, as for `planfly.fly`.
     aircraft: name or folder of the aircraft, whose cruise speed a .plan states, and to which the parameters apply.
-    autopilot: autopilot of a .plan (its firmwareType) and of the parameters in a .parm; None for that of the source.
+    autopilot: autopilot of a .plan (its firmwareType) and of the parameters in a .parm; None for the source's one.
     params: a file of this autopilot's parameters, which replaces the parameters of the source.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
@@ -192,8 +193,8 @@ def export(
 def _find_chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
     """Return the name of the autopilot that the user named, directly or by its parameter file.
 
-    Return "" without either.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that belongs
-    to no autopilot.
+    Returns "" if the user gave neither.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file
+    that belongs to no autopilot.
     """
     check_arguments(autopilot=autopilot)
     if autopilot is not None:
@@ -209,7 +210,7 @@ def _find_chosen_autopilot(autopilot: str | None, params: str | Path | None) -> 
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Add to a source the autopilot for a .plan, and notes on content that the .plan will not have.
+    """Return a source with the autopilot for a .plan, and with notes on content that the .plan will not have.
 
     The .plan has the autopilot that the user named, or else the source's autopilot, or else `DEFAULT_AUTOPILOT`.
 
@@ -238,9 +239,11 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
 def _with_missing_ends_note(
     source: _SourceContent, targets: tuple[Path, ...], autopilot: str, params: str | Path | None
 ) -> _SourceContent:
-    """Add to a source, except a log, a note why PX4 refuses a mission without take-off or landing.
+    """Return a source with a note if PX4 would refuse its mission, because take-off or landing is missing.
 
-    autopilot: name of the autopilot that the user named, which replaces that of the source; "" if the user named none.
+    A log, and a mission for another autopilot, get no note.
+
+    autopilot: name of the autopilot that the user named, which replaces the source's autopilot; "" if none was named.
     params: parameter file of the named autopilot, whose requirement applies.
     targets: files to write; without a mission file among them there is no note.
     """
@@ -309,9 +312,11 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
 
 
 def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
-    """Add returns and glides from a few points of the flight to a source, for a map.
+    """Return a source with simulated returns and glides from a few points of the flight, for a map.
 
-    If `track` is None, they start on the planned path.  The source is unchanged if returns cannot be judged.
+    track: rows of the flight; None for returns from the planned path.
+
+    The source is returned unchanged if returns cannot be judged.
     """
     with stage("flying returns for the map"):
         drawn_returns = return_summary(setup, track).data_for_pictures()
@@ -325,7 +330,7 @@ def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | Non
 def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _SourceContent:
     """Read the parts of a plan or a mission file that the target files need.
 
-    Its scenario is loaded only if a target, a plan, a fence or a time needs it.  Raises MissionError for a missing
+    The scenario is loaded only if a target, a plan, a fence or a time needs it.  Raises MissionError for a missing
     file.
 
     needs_world: True if a target needs the scenario.

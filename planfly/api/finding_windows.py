@@ -119,7 +119,7 @@ def window(
 
 
 def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Sequence[datetime]) -> CampaignBase:
-    """Open the mission at the first of several departures that the forecast covers.
+    """Open the mission at the first departure (of at most `MAX_DEPARTURES`) that the forecast covers.
 
     Raises ArgumentError if no forecast is named.  If the forecast covers no departure, raises the ForecastError of the
     first departure.

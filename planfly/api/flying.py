@@ -63,7 +63,7 @@ from world.scenario import Scenario, with_terrain
 class Judged:
     """Result of `planfly.judge`.
 
-    setup: all inputs of the flight.
+    setup: mission, scenario, aircraft and autopilot of the flight.
     verdict: verdict on the mission, with a finding for every rule and place.
     loss: description of the part of a flight log that could not be read, in one line; "" if nothing is missing.
     lossy: True if part of a log could not be read.
@@ -82,12 +82,12 @@ class Judged:
 
     @property
     def returns_line(self) -> str:
-        """One line on returns from a few points of the flight or the planned path; "" without a home."""
+        """One line on returns to launch from a few points of the flight or the planned path; "" without a home."""
         return self.return_summary.line
 
     @property
     def return_summary(self) -> ReturnSummary:
-        """Returns from a few points of the flight or the planned path, computed at each call."""
+        """Simulated returns to launch from a few points of the flight or planned path, computed at each access."""
         return return_summary(self.setup, self.track, self.requirements)
 
 
@@ -234,7 +234,7 @@ def fly_by_each(
 def judge(
     what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Judged:
-    """Judge a flight log, or fly and judge a plan or a mission; return the verdict and the flight.
+    """Judge a flight, or fly and judge a plan or a mission; return the verdict and the flight.
 
     what: a flight log or its path, an autopilot's log, a result of `planfly.fly`, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
@@ -318,7 +318,7 @@ def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: s
 
     source: name of the source, for the message.
     keywords: value of each keyword; None if it was not given.
-    reason: reason for the refusal, for the message.
+    reason: end of the message: the reason why they do not apply.
     """
     for name, value in keywords.items():
         if value is not None:
@@ -336,7 +336,10 @@ _FIXED_SCENARIO_TEXT = (
 
 
 def check_judging_options(source: str, options: MissionOptions) -> None:
-    """Raise ScenarioError for an option that would change the flight recorded in a log."""
+    """Raise ScenarioError for a given option that would change the flight that a log recorded.
+
+    source: name of the log, for the message.
+    """
     allowed_options = (*LOG_OPTIONS, "terrain", "fence", "scenario")
     check_keywords_not_given(
         source, {name: value for name, value in options.items() if name not in allowed_options}, _FIXED_OPTIONS_TEXT
@@ -345,7 +348,9 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def check_program(sitl: str | Path) -> Path:
-    """Return the path of an autopilot program (SITL) that can be run.
+    """Check that an autopilot program (SITL) can be run, and return its path.
+
+    sitl: path of the executable.
 
     Raises FlightError for a file that cannot be run, and MissingExtraError if a package for programs is missing.
     """

@@ -120,12 +120,12 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
 
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
-    """Return the rows of the table of a front, with the keys `COLUMNS`; an unknown energy is None."""
+    """Return a row for each plan of a front, with the keys `COLUMNS`; an unknown value, such as energy, is None."""
     return [_make_table_row(number, front_plan) for number, front_plan in enumerate(front.plans, 1)]
 
 
 def _make_table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
-    """Return a row of the table of a front, keyed by `COLUMNS`.
+    """Return the row of one plan, keyed by `COLUMNS`.
 
     number: number of the plan, from 1.
     """

@@ -93,9 +93,9 @@ def ground_risk(
 
 
 def _write_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:
-    """Write volumes, map, table and page of a result into a folder, and return the result with the files.
+    """Write volumes, map, table and page of a result into a folder; return the result with the written files.
 
-    command: command line that repeats the search; "" without one.
+    command: command line that repeats the search, for the page; "" to show none.
     """
     # Imported here: only pictures need matplotlib.
     from logs.views.drawing import png_bytes

@@ -172,7 +172,11 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
-    """Return the result of an identification, with the performance and the deficiencies of the logs."""
+    """Return the result of an identification, with the aircraft's performance and the deficiencies of the logs.
+
+    aircraft: the aircraft as read from its new folder.
+    records: usable segments of the logs.
+    """
     climb, sink, power = _compute_performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
@@ -189,7 +193,7 @@ def _make_result(
 
 
 def _load_base(base: str | Path) -> Aircraft:
-    """Load the base of an identification, by name or folder.
+    """Load the base of an identification (the aircraft that it starts from), by name or folder.
 
     Raises FlightError for an aircraft that was itself identified, or that burns fuel.
     """
@@ -232,10 +236,13 @@ def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> 
 def read_records_and_outputs(
     log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS, until: float | None = None
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
-    """Return the flight records of a log, and the servo outputs with which they were read.
+    """Return the flight records of a log, and the servo outputs with which they were read, by name.
 
-    The servo outputs of the base are used if all of them match the log; otherwise those of the log are used.  PX4 and
-    aircraft with elevons, whose mixer is part of the model, always use those of the base.
+    The servo outputs of the base are used if all of them match the log, and otherwise the servo outputs of the log.
+    PX4, tables of columns and aircraft with elevons, whose mixer is part of the model, always use the outputs of the
+    base.
+
+    prior: the base aircraft.
 
     min_seconds: shortest usable flight, s.
     until: end of the part that is used, s of the log; None for the whole log.
@@ -286,7 +293,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
-    """Return sink angle and power, or one of them, if the logs determine them only within a wide interval."""
+    """Return the quantities among sink angle and power that the logs determine only within a wide interval."""
     _, sink, power = _compute_performance_intervals(identified)
     return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 
@@ -296,9 +303,9 @@ Interval = tuple[float, float, float]
 
 
 def _compute_performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
-    """Return the intervals of climb angle (deg), sink angle (deg) and power (W).
+    """Return the intervals of climb angle (deg), sink angle (deg) and power (W) at cruise.
 
-    Each is lower end, estimate and upper end (95 %).
+    Each interval is (lower end, estimate, upper end), with 95 % probability.
     """
     best, samples = identified.performance()
 

@@ -51,7 +51,7 @@ class Reflown:
 
 @api_function()
 def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
-    """Read and judge a flight from the log of another program, with the options of `import_log`.
+    """Read and judge a flight from another program's log, with the options of `import_log`, without writing a log.
 
     Raises ScenarioError for an option that does not apply to a flight from a log.
     """
@@ -224,7 +224,7 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
 
 
 def recovered_path(log: str | Path) -> Path:
-    """Return the default file of a recovered log.
+    """Return the default path for the readable part of a damaged log: ``<log>-recovered.mcap`` next to the log.
 
     >>> recovered_path("runs/flight.mcap").name
     'flight-recovered.mcap'

@@ -52,8 +52,8 @@ _NEEDED = ("frequency", "power", "sensitivity")
 class WorstPoint(NamedTuple):
     """Point of an outage with the smallest margin.
 
-    margin: dB above the fade margin, negative.
-    lat_deg, lon_deg: position.
+    margin: signal above the fade margin, dB; negative.
+    lat_deg, lon_deg: position of the aircraft.
     """
 
     margin: float
@@ -70,7 +70,7 @@ class LinkResult:
     along: the link once a second along the flight; None if it cannot be computed.
     antenna: position of the station's antenna, (3,) m; None without `along`.
     where: leg with the least margin; "" if no margin is known.
-    returns: the autopilot's returns from the outages, as `planfly.returns` judges them; None without such a return.
+    returns: the autopilot's returns to launch from the outages, judged as by `planfly.returns`; None if there are none.
     files: files written; empty if no folder was named.
     """
 

@@ -97,7 +97,7 @@ def make_scenario(
 
 
 def _convert_to_plain_values(values: Any) -> Any:
-    """Convert numpy arrays and numbers in tables to lists and numbers of Python."""
+    """Return tables in which numpy arrays and numbers, at any depth, are lists and numbers of Python."""
     if isinstance(values, Mapping):
         return {key: _convert_to_plain_values(value) for key, value in values.items()}
     if isinstance(values, list | tuple):

@@ -57,9 +57,9 @@ class BestFound:
 
 
 class Optimiser:
-    """Search within a box, made by `planfly.optimise`.
+    """Optimiser of a function within a box, made by `planfly.optimise`.
 
-    `ask` returns points, and `tell` takes the values of these points.
+    `ask` returns points to evaluate, and `tell` takes the values of the function at these points.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Optimiser:
     def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
         """Receive the values of the points from `ask`, and draw the next points from the better half.
 
-        The first values may be those of the points given as `initial`, without a call of `ask`.
+        The first call may give the values of the points `initial`, without an earlier call of `ask`.
 
         values: values to minimise, (n,), or (n, m) for m objectives, which are compared by Pareto dominance.
         violations: amount by which each constraint is violated, (n,) or (n, v), 0 or less if the constraint is met; a

@@ -99,6 +99,8 @@ _END_TOLERANCE_M = 1.0
 def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOptions) -> Floats:
     """Check the user's waypoints, and return them as an array (w, 3), m.
 
+    options: options of the plan.
+
     Raises ArgumentError for another shape, for a value that is not finite or outside the map, for a path that does not
     lead from the scenario's start to its destination, and for an option of a search.
     """
@@ -212,10 +214,10 @@ def _search_and_write(
 def _find_plan_target(
     world: Scenario, source: Scenario | str | Path, options: PlanOptions, out: str | Path | None, overwrite: bool
 ) -> Path | None:
-    """Return the checked path of the plan.json to write; None to write no file.
+    """Return the checked path of the plan.json to write; None if `out` is None.
 
-    world, source: the scenario, and the name, file or `Scenario` that the caller passed, which is not overwritten.
-    out: path in which placeholders are still to be replaced, or None.
+    world, source: the scenario, and the name, file or `Scenario` that the caller passed.  Its file is not overwritten.
+    out: path in which {name} and {seed} are still to be replaced.
     """
     if out is None:
         return None
@@ -234,14 +236,14 @@ def _write_plan(plan: Plan, target: Path | None) -> Plan:
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Make a function that tells a search when to stop.
+    """Make the function that a search calls to find out if it has to stop.
 
     The function returns "interrupted" as soon as `stop` returns True, "budget" after a number of seconds, and otherwise
-    "".  The time in which kernels are compiled does not count.
+    "".  The time in which kernels are compiled is not included.
     """
 
     def measure_working_time() -> float:
-        """Return the time of the process without the compilation of kernels, s."""
+        """Return a clock reading, s, that excludes the time in which kernels were compiled."""
         return time.monotonic() - COMPILE_TIMER.seconds
 
     start = measure_working_time()

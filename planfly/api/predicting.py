@@ -1,4 +1,4 @@
-"""Predict a logged flight blindly, as bands of 95 %, and count how often the flight is inside."""
+"""Predict a logged flight as bands of 95 %, and measure which part of the flight is inside the bands."""
 
 import math
 from collections.abc import Sequence
@@ -236,7 +236,7 @@ def _choose_judged_start(
 
 
 def draw_flight_variations(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
-    """Draw variations of aircraft, wind, turbulence and position, one set for each predicting flight.
+    """Sample variations of aircraft, wind, turbulence and position, one set for each simulated flight.
 
     The quantities are drawn as in a campaign with planfly's own dispersions, with two differences: the wind varies by
     the error of a logged wind instead of a forecast, and all levels of turbulence are equally likely.  The position
@@ -265,7 +265,7 @@ def draw_flight_variations(aircraft: Aircraft, count: int = DRAWS) -> list[Drawn
 
 
 def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> Predicted:
-    """Predict a flight by simulating its mission with sampled variants of the aircraft.
+    """Predict a flight by flying its logged mission many times with sampled variations.
 
     Raises LogError for a log of a flight that planfly itself simulated.
     """

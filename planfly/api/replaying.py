@@ -34,7 +34,10 @@ def _read_log_if_path(log: FlightLog | str | Path) -> FlightLog:
 
 
 def replay_interval(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
-    """Return start and end of a replay in flight time, s.  Raises LogError for an empty interval."""
+    """Return start and end of a replay in flight time, s; None stands for the start or end of the log.
+
+    An end after the end of the log becomes the end of the log. Raises LogError for an empty interval.
+    """
     check_arguments(start=start, end=end)
     start_time = start if start is not None else float(log.track.time[0])
     end_time = log.end_time if end is None else min(end, log.end_time)
@@ -94,7 +97,7 @@ def replay(
     speed: float | None = None,
     width: int | Callable[[], int] = 80,
 ) -> Iterator[tuple[float, list[str]]]:
-    """Play a flight in real time, ten times a second and once at its end, as the command does.
+    """Play a flight in real time: yield the instruments ten times a second, and once at the end.
 
     start, end: start and end of the played part in flight time, s; None for the start or end of the flight.
     speed: multiple of real time, 1 if None.

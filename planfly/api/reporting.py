@@ -50,7 +50,9 @@ class WrittenReport:
 class _ReportContent(NamedTuple):
     """Flight or plan that a report shows.
 
-    versions: package versions of the flight; None for the installed versions.
+    track: rows of the flight; None for a plan.
+    ended: reason for the end of the flight; None for a plan.
+    versions: versions of the packages that simulated the flight; None for the installed versions.
     """
 
     setup: FlightSetup

@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RemedyTrial:
-    """A remedy, and the outcome of the returns after the remedy.
+    """A remedy, and the outcome of all returns simulated with it.
 
     The returns are flown by the simulated autopilot, those closest to a limit also in JSBSim.
     """
@@ -119,9 +119,9 @@ class ReturnsResult:
 
     @property
     def program_lines(self) -> tuple[str, ...]:
-        """Lines that compare the worst returns flown by the ArduPlane program and by the simulated ArduPlane.
+        """Lines that compare the worst returns as flown by the ArduPlane program and by the simulated ArduPlane.
 
-        () if the program flew no returns.
+        The tuple is empty if no program was named.
         """
         if self.by_program is None:
             return ()
@@ -129,7 +129,7 @@ class ReturnsResult:
 
     @property
     def no_return_line(self) -> str:
-        """Line on the point of the flight after which the battery is too low for a return."""
+        """Line on the point of no return: the point of the flight after which the energy is too low for a return."""
         return point_of_no_return_text(self.returns)
 
     @property

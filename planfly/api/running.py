@@ -51,7 +51,7 @@ class Round:
     """One round of a run.
 
     number: number of the round, from 0.
-    changes: one line for each limit that was tightened for its planning.
+    changes: one line for each limit that was tightened for this round's plan.
     verdict: verdict on its flight, or on its plan if nothing was flown.
     flown: True if it was flown.
     folder: the folder of its files.
@@ -85,7 +85,7 @@ class RunResult:
     seed: seed of planner and turbulence.
     folder: the folder of the files; the files of earlier rounds are in its subfolders round-0, round-1, ...
     rounds: one or more rounds; the verdict on the last round is the answer.
-    ended: reason why the last round was the last.
+    ended: reason why no further round was planned.
     """
 
     scenario: str
@@ -108,7 +108,7 @@ class RunResult:
 
 @dataclass(frozen=True, slots=True)
 class _RunTask:
-    """Common settings of all rounds.
+    """Settings that all rounds of a run have in common.
 
     scenario: the scenario in which each round is judged.
     uav: the aircraft of the scenario.
@@ -117,7 +117,7 @@ class _RunTask:
     program: program of an autopilot; None for planfly's own simulation.
     reference: cases in which reference flights are flown.
     limits: limits of the flight time and of the size of the log.
-    every: interval of the log's rows; 1 records every row.
+    every: stride of the log's rows: every n-th row is recorded.
     engine: flight model that flies.
     """
 
@@ -261,7 +261,10 @@ def _fly_rounds(
 
 
 def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
-    """Write a plan, its mission and its verdict into the run's folder; fly and draw a feasible plan."""
+    """Write a plan, its mission and its verdict into the run's folder; if the plan is feasible, fly and report it.
+
+    number: number of the round, from 0.
+    """
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 

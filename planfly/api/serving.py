@@ -75,7 +75,7 @@ def serve(
 def link_access(
     to: str | Sequence[str], bind: str, allow: str | Sequence[str] | None = (), sign_key: str | Path | None = None
 ) -> "Access":
-    """Parse and check the addresses and the signing key of a link.
+    """Parse and check the addresses and the signing key of a MAVLink connection.
 
     Several addresses are a sequence, or separated by commas.  Raises FlightError or PlanflyError for invalid addresses.
 
@@ -99,7 +99,7 @@ def link_access(
 
 
 def _split_addresses(addresses: str | Sequence[str]) -> Sequence[str]:
-    """Split addresses at commas; a sequence is returned unchanged."""
+    """Split a text of addresses at commas; a sequence is returned unchanged."""
     return addresses.split(",") if isinstance(addresses, str) else addresses
 
 

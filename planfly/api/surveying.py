@@ -70,7 +70,7 @@ class SurveyResult:
     surveys: surveys of the mission, in the order flown.
     lines: measures of each line of each survey; None for a line that was not flown.
     overlaps: overlap of the photos of each survey; None if it cannot be measured, for instance without a camera.
-    photos: number of photos taken over the whole flight, also beside the lines; 0 if no item states their distance.
+    photos: number of photos taken over the whole flight, also off the lines; 0 if no item states their distance.
     remedies: remedies that help, each tested by a flight; empty if none were requested or no line is lost.
     nearest: the trial that came closest to success, if remedies were requested and none helps.
     kept: reason why the layout was kept and no other layout was tried, for messages.
@@ -271,9 +271,9 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 
 
 def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool) -> SurveyResult:
-    """Write the picture of the photo lines and the files of the remedies into a folder.
+    """Write the picture of the photo lines and the files of the remedies; return the result with these files.
 
-    Return the result with the written files; nothing is written if `out` is None.
+    out: folder; None to write nothing.
     """
     if out is None:
         return result
@@ -334,7 +334,8 @@ def _check_has_survey(setup: FlightSetup) -> None:
 def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyResult:
     """Measure the photo lines of a flight and the overlap of its photos.
 
-    Without a track, each measure is None.
+    requirements: requirements of the route, with its surveys.
+    track: rows of the flight; without rows, each measure is None.
     """
     setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None

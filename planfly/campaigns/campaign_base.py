@@ -37,7 +37,7 @@ from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
 from world.files import absolute_path, write_atomically
-from world.forecast.scenario_wind import shift_wind
+from world.forecast.scenario_wind import with_mean_wind
 from world.frames import to_map
 from world.scenario import Scenario, with_ground
 from world.terrain import Terrain
@@ -326,7 +326,7 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     gradient = min(MAX_WIND_GRADIENT, max(-MAX_WIND_GRADIENT, old_wind.gradient + values["wind_gradient"]))
     level = TURBULENCE_LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
     turbulence = TURBULENCE_LEVELS[min(len(TURBULENCE_LEVELS) - 1, max(0, level))]
-    drawn_wind = shift_wind(old_wind, speed, math.radians(from_deg), gradient)
+    drawn_wind = with_mean_wind(old_wind, speed, math.radians(from_deg), gradient)
     drawn_wind = replace(drawn_wind, turbulence=turbulence, seed=None)
     changes = {"speed_mps": speed, "from_deg": from_deg, "gradient": drawn_wind.gradient}
     wind_table = base.scenario.spec.wind.model_copy(update=changes | {"turbulence": turbulence, "seed": None})

@@ -18,7 +18,7 @@ from planfly.campaigns.worker_pool import Workers, worker_pool
 from planfly.runtime.stages import Advance
 from planfly.workflow.open_flight import planned_duration
 from world.errors import ForecastError
-from world.scenario import Scenario, forecast_of_scenario, in_forecast_member, with_flight_time
+from world.scenario import Scenario, read_scenario_forecast, with_flight_time, with_forecast_member
 
 # Largest number of departures in one search.
 MAX_DEPARTURES = 400
@@ -213,11 +213,11 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
         try:
             # The scenario once for each member of its forecast, with the wind of that member.
             scenario = with_flight_time(base.scenario, time.isoformat())
-            forecast = forecast_of_scenario(scenario)
+            forecast = read_scenario_forecast(scenario)
             members = (
                 (scenario,)
                 if forecast.members == 1
-                else tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
+                else tuple(with_forecast_member(scenario, forecast, member) for member in range(forecast.members))
             )
             replace(base, scenario=members[0]).nominal_setup()
             departures.append(Departure(time, members))

@@ -130,7 +130,7 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """List the built-in aircraft, show the named aircraft, or make a folder for a new aircraft."""
+    """List the built-in aircraft, show one, or make or identify a new one, as the options say; return the exit code."""
     from planfly.api import aircraft as aircraft_api
 
     if args.logs is not None:
@@ -166,7 +166,7 @@ def aircraft(args: argparse.Namespace) -> int:
 
 
 def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
-    """Return the answer for --json: one aircraft with its numbers, or several aircraft without numbers."""
+    """Return the answer of ``planfly aircraft`` for --json: one aircraft with its numbers, or several without."""
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)
@@ -174,7 +174,7 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 
 def _make_folder(args: argparse.Namespace) -> int:
-    """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
+    """Make the folder of a new aircraft from a data sheet or as a copy, and print its limits; return the exit code."""
     from aircraft.uncertainty import read_uncertainty
     from flight.dynamics.envelope_tables import load_envelope
     from planfly.api import aircraft as aircraft_api
@@ -305,7 +305,7 @@ def _identify(args: argparse.Namespace) -> int:
 
 
 def _print_uncertain_properties(result: "IdentifiedAircraft") -> None:
-    """Print the properties that the logs do not determine, and the flights that would determine them."""
+    """Print the properties that the logs determine poorly, and the logs or flights that would determine them."""
     if not result.estimate.dynamics:
         print("  performance only: moments need at least 10 rows of inertial sensors and of outputs per second")
     for log in result.slow:

@@ -178,7 +178,7 @@ def add_flights_options(parser: CommandParser) -> None:
 def campaign(args: argparse.Namespace) -> int:
     """Fly a campaign, resume one, or fly one of its flights again; return the exit code.
 
-    The code follows from the answer on the target; it is also INCOMPLETE if there is no target and a flight is
+    The code follows from the answer on the target (`_EXIT_CODES`). Without a target, it is INCOMPLETE if a flight is
     undecided.
     """
     from logs.verdict.rule_words import rule_word
@@ -219,7 +219,10 @@ def campaign(args: argparse.Namespace) -> int:
 
 
 def winds(args: argparse.Namespace) -> int:
-    """Find the strongest wind from each direction in which a mission succeeds, or resume the search; draw a chart."""
+    """Find the strongest wind from each direction in which a mission is flyable; return the exit code.
+
+    The code follows from the answer of the search: see `_WINDS_EXIT_CODES`.
+    """
     from planfly.api import campaigns
 
     folder = _result_folder(args, "winds")
@@ -238,19 +241,24 @@ def winds(args: argparse.Namespace) -> int:
 
 
 def _with_exit_code(file: Path, code: int) -> str:
-    """Return the JSON text of a file of results with the exit code after its schema."""
+    """Return the JSON text of a results file, with the exit code inserted after the schema."""
     document = json.loads(file.read_text(encoding="utf-8"))
     return json.dumps({"schema": document["schema"], "exit_code": code, **document}, indent=1) + "\n"
 
 
 def _result_folder(args: argparse.Namespace, kind: str) -> Path:
-    """Return the folder of the results: the named folder or ``runs/<name>-<kind>``."""
+    """Return the folder of the results: the folder in --out, or ``runs/<name>-<kind>``.
+
+    kind: "campaign" or "winds".
+    """
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 
 @contextmanager
 def _report_stored_flights(args: argparse.Namespace, folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Report the number of stored flights if the block is interrupted.
+    """If this block is interrupted, print the number of flights that are stored so far.
+
+    table: name of the table of flights in the folder.
 
     Yields a function that returns the exit code of the interruption, or 0 without an interruption.
     An interruption before the table exists is raised again.

@@ -81,7 +81,10 @@ def add_check_parser(command_line: LineParser) -> None:
 
 
 def check(args: argparse.Namespace) -> int:
-    """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
+    """Judge a flight or a mission, and print the verdict.
+
+    Returns the exit code of the verdict (of the worst verdict, for several autopilots), or 3 for an incomplete log.
+    """
     from planfly.api import flying
     from planfly.terminal.verdict_lines import autopilot_lines, verdict_lines
 

@@ -31,9 +31,9 @@ def add_compare_parser(command_line: LineParser) -> None:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences, and draw those of two logs if a folder is named.
+    """Print the differences of two logs or two campaigns, and draw the differences of logs if a folder is named.
 
-    The exit code is 3 if one of the logs is incomplete.
+    Returns the exit code: 3 if one of the logs is incomplete, otherwise 0.
     """
     from logs.recording.reader import read_log
     from planfly.api import reporting

@@ -47,7 +47,7 @@ def add_fly_parser(command_line: LineParser) -> None:
 
 
 def fly(args: argparse.Namespace) -> int:
-    """Fly a mission, write its log, and return the exit code of the verdict."""
+    """Fly a mission, write its log, and print the verdict; return the exit code of the verdict."""
     from planfly.api import flying
     from planfly.terminal.verdict_lines import verdict_lines
 

@@ -69,9 +69,9 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
 
 
 def ground_risk(args: argparse.Namespace) -> int:
-    """Find the ground risk; return the exit code.
+    """Find the ground risk class of a mission; return the exit code.
 
-    The exit code is 0 if the class is known, and 3 if the population is not.
+    The exit code is 0 if the class is judged, and 3 if it is not, because the population is not known.
     """
     from logs.verdict.conditions import flown_condition_lines
     from planfly.api import ground_risk as ground_risk_api

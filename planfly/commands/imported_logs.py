@@ -129,7 +129,10 @@ def add_refly_parser(command_line: LineParser) -> None:
 
 
 def refly(args: argparse.Namespace) -> int:
-    """Fly the mission again, and compare and draw both flights; return 3 for an incomplete log."""
+    """Fly the mission again, and compare and draw both flights.
+
+    Returns the exit code: 3 for an incomplete log, otherwise 0.
+    """
     from logs.recording.reader import read_log
     from planfly.api import imported
 

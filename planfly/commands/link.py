@@ -72,7 +72,7 @@ def add_link_parser(command_line: LineParser) -> None:
 def link(args: argparse.Namespace) -> int:
     """Judge the radio link; return the exit code.
 
-    The exit code is 0 if the link is kept, 4 if it is lost for too long, and 3 if this is not known.
+    The exit code is 0 if the link is never lost for longer than accepted, 4 if it is, and 3 if this is not known.
     """
     from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import linking

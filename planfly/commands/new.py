@@ -56,7 +56,10 @@ def add_new_parser(command_line: LineParser) -> None:
 
 
 def new(args: argparse.Namespace) -> int:
-    """Write the scenario, and plan a path in it; return 4 if the plan is not safe, but keep the file."""
+    """Write the scenario, and plan a path in it.
+
+    Returns the exit code: 0, or 4 if the plan is not safe; the file is kept in both cases.
+    """
     from planfly.api import drafting, planning
 
     file = drafting.new_scenario(**given_options(args))

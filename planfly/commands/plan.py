@@ -99,7 +99,10 @@ def _algorithms_help() -> str:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan a path, and write the plan file; return 4 if the plan is not safe, or fails in its flights."""
+    """Plan a path, and write the plan file; with --front, plan a Pareto front.
+
+    Returns the exit code: 0, or 4 if the plan is not safe, or if too few of the flights of --flights are flyable.
+    """
     from planfly.api import planning
 
     # The options for planning in flight are allowed only together.
@@ -137,7 +140,7 @@ def plan(args: argparse.Namespace) -> int:
 
 
 def _plan_front(args: argparse.Namespace) -> int:
-    """Plan a Pareto front and write its folder; return 4 if there is no safe plan."""
+    """Plan a Pareto front, and write its folder; return the exit code: 0, or 4 if there is no safe plan."""
     from planfly.api import fronts
     from planfly.api.fronts import FRONT_FOLDER
     from planfly.terminal.plan_answers import front_answer, front_lines

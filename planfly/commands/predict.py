@@ -1,4 +1,4 @@
-"""``planfly predict``: predict a logged flight blindly, as bands of 95 %."""
+"""``planfly predict``: predict a logged flight, which the model has not seen, as bands of 95 %."""
 
 import argparse
 import math

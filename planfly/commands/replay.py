@@ -104,7 +104,7 @@ def add_replay_parser(command_line: LineParser) -> None:
 def replay(args: argparse.Namespace) -> int:
     """Show the instruments or the timeline, or replay as the options request.
 
-    The exit code is 3 for an incomplete log.
+    Returns the exit code: 3 for an incomplete log, otherwise 0.
     """
     from logs.recording.reader import read_log
     from logs.views.replay.timeline import entry_lines
@@ -156,7 +156,10 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
-    """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
+    """Return the answer of ``planfly replay`` for --json, with the timeline of the replayed part.
+
+    A replay to ground stations has the timeline of the whole flight.
+    """
     from planfly.api import replaying
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 

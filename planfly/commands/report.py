@@ -35,7 +35,11 @@ def add_report_parser(command_line: LineParser) -> None:
 
 
 def report(args: argparse.Namespace) -> int:
-    """Draw and write the report; return the exit code of the verdict, or 3 for an incomplete log."""
+    """Write the report or, with --layout, the layout for Foxglove.
+
+    Returns the exit code of the verdict, or 3 for an incomplete log; with --layout 0, and 2 with neither a log nor
+    --layout.
+    """
     from logs.recording.reader import read_log
     from planfly.api import reporting
 

@@ -77,9 +77,9 @@ def add_returns_parser(command_line: LineParser) -> None:
 
 
 def returns(args: argparse.Namespace) -> int:
-    """Judge every return; return the exit code.
+    """Judge returns to launch from all along a flight, and print the outcomes; return the exit code.
 
-    The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if some are undecided.
+    The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if none is unsafe but some are undecided.
     """
     from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import returning

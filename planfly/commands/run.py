@@ -60,7 +60,7 @@ def add_run_parser(command_line: LineParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``.
 
-    Returns the exit code of the verdict, or 4 if the plan fails in the flights of ``--flights N``.
+    Returns the exit code of the verdict, or 4 if too few of the flights of ``--flights N`` are flyable.
     """
     from planfly.api import running
     from planner.plan import read_plan
@@ -108,7 +108,7 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "D
 
 
 def _print_round(finished_round: "Round") -> None:
-    """Print the verdict on a round, the line on returns, the flight model, and the written files."""
+    """Print the verdict on a round, the line on returns to launch, the flight model, and the written files."""
     from planfly.terminal.verdict_lines import verdict_lines
 
     print(*verdict_lines(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary), sep="\n")

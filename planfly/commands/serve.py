@@ -57,7 +57,7 @@ def add_serve_parser(command_line: LineParser) -> None:
 
 
 def serve(args: argparse.Namespace) -> int:
-    """Serve until SIGINT or SIGTERM."""
+    """Serve the simulated vehicle until SIGINT or SIGTERM; return the exit code 0."""
     from planfly.api import serving
 
     with watch_stop_signals() as should_stop:

@@ -80,7 +80,7 @@ def add_studio_parser(command_line: LineParser) -> None:
 
 
 def studio(args: argparse.Namespace) -> int:
-    """Serve until SIGINT or SIGTERM."""
+    """Serve the studio's page until SIGINT or SIGTERM; return the exit code 0."""
     from planfly.studio.open_studio import open_studio
 
     with watch_stop_signals() as should_stop:

@@ -60,9 +60,10 @@ def add_survey_parser(command_line: LineParser) -> None:
 
 
 def survey(args: argparse.Namespace) -> int:
-    """Judge every photo line; return the exit code.
+    """Judge every photo line of a survey; return the exit code.
 
-    The exit code is 4 if too much of a photo line is lost, otherwise that of the verdict on the flight.
+    The exit code is 4 if too much of a photo line is lost or photos overlap too little, and otherwise the code of the
+    verdict on the flight.
     """
     from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import surveying

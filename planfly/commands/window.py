@@ -47,7 +47,7 @@ def add_window_parser(command_line: LineParser) -> None:
 
 
 def window(args: argparse.Namespace) -> int:
-    """Find the departures; return the exit code.
+    """Find the times of take-off at which a mission is flyable; return the exit code.
 
     The exit code is 0 if the requested departure is open (or any departure if none is requested), 4 if not, and 3 if it
     is not judged in full.

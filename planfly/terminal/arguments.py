@@ -156,7 +156,7 @@ def parse_threat(text: str) -> tuple[float, float, float, float]:
 def parse_problems(text: str) -> tuple[int, ...]:
     """Parse threat counts separated by commas, such as "7,15", and return them sorted without duplicates.
 
-    Only the four counts of the paper's problems are allowed: 7, 15, 30 and 60.
+    Raises argparse.ArgumentTypeError for other counts than those of the four problems in the paper: 7, 15, 30 and 60.
     """
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
@@ -183,17 +183,17 @@ IMPORTED_LOG_SUFFIXES = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
 def with_completer(action: argparse.Action, completer: Completer) -> argparse.Action:
-    """Attach a completer to an argument, and return the argument."""
+    """Attach a function that completes an argument in the shell, and return the argument."""
     # argcomplete reads this attribute.
     action.completer = completer  # type: ignore[attr-defined]
     return action
 
 
 def file_completer(*suffixes: str) -> Completer:
-    """Return a completer for folders and for files with the given suffixes."""
+    """Return a completer for folders and for files with the given suffixes (without the dot)."""
 
     def propose(prefix: str, **_context: object) -> Iterable[str]:
-        """Complete a file name in the shell: return the files with these suffixes, and the folders, by prefix."""
+        """Return the files with these suffixes, and the folders, that start with a prefix."""
         from argcomplete.completers import FilesCompleter
 
         return FilesCompleter(suffixes)(prefix)
@@ -228,7 +228,7 @@ def complete_mission_or_scenario(prefix: str, **context: object) -> list[str]:
 
 
 def complete_for_shell(parser: argparse.ArgumentParser) -> None:
-    """Print completions and end the process if a shell has requested them."""
+    """If a shell has requested completions, print them and end the process; otherwise do nothing."""
     import argcomplete
 
     argcomplete.autocomplete(parser, always_complete_options="long")

@@ -36,7 +36,7 @@ INTERRUPTED = 130
 
 
 def verdict_code(verdict: "Verdict") -> int:
-    """Return the exit code for a verdict that is flyable, not flyable, or not judged in full."""
+    """Return the exit code for a verdict: FLYABLE, NOT_FLYABLE, or INCOMPLETE if it is undecided."""
     if verdict.undecided:
         return INCOMPLETE
     return FLYABLE if verdict.flyable else NOT_FLYABLE
@@ -116,7 +116,7 @@ class OptionGroup(Protocol):
 
 
 class UsageExit(SystemExit):
-    """Raised to end the process after bad usage.  line: the printed line."""
+    """Exception that ends the process after bad usage.  line: the line that was printed."""
 
     def __init__(self, line: str) -> None:
         super().__init__(BAD_INPUT)
@@ -159,7 +159,7 @@ class CommandParser(argparse.ArgumentParser):
         self._aliases[keyword] = option
 
     def take_late_arguments(self, parsed: argparse.Namespace, unknown_arguments: list[str]) -> bool:
-        """Store positional arguments that argparse left over; return True if a parameter takes them.
+        """Store positional arguments that argparse left over, if a parameter can take them; return True if so.
 
         argparse itself accepts an optional positional argument only directly after the other positional arguments, not
         after an option.
@@ -177,12 +177,12 @@ class CommandParser(argparse.ArgumentParser):
         return False
 
     def options_by_keyword(self) -> dict[str, str]:
-        """Return the option that sets each API keyword, by keyword."""
+        """Return a dictionary from API keywords to the options that set them, such as {"start": "--from"}."""
         options_by_dest = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return options_by_dest | self._aliases
 
     def long_options(self) -> list[str]:
-        """Return the parser's options that begin with two dashes."""
+        """Return the parser's options that begin with two dashes, without duplicates."""
         return list(dict.fromkeys(_LONG_OPTION.findall(self.format_usage())))
 
 
@@ -301,9 +301,7 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
 
 
 def _similar_option_hint(option: str, options: Iterable[str]) -> str:
-    """Return a hint at the option most similar to an unknown option, for the end of a message.
-
-    Returns "" if no option is similar.
+    """Return the end of a message that suggests the option most similar to an unknown option; "" if none is similar.
 
     The leading dashes, which all options share, are not compared.
 

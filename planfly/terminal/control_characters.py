@@ -1,4 +1,4 @@
-"""Escapes for control characters, so that no text of a foreign file controls the terminal."""
+"""Escape control characters, so that no text from a file controls the terminal."""
 
 import json
 import re

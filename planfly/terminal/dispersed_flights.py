@@ -1,4 +1,4 @@
-"""Fly a finished plan with the default dispersions, and say in how many flights it holds (``--flights N``)."""
+"""Fly a finished plan with the default dispersions, and state how many flights are flyable (``--flights N``)."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -13,9 +13,11 @@ if TYPE_CHECKING:
 
 
 def check_flights_option(args: argparse.Namespace, excluded: str) -> None:
-    """Raise an error, before anything is planned, if ``--flights`` cannot be flown.
+    """Raise ScenarioError or MissingExtraError if ``--flights`` was given but cannot be flown.
 
-    excluded: name of the option that cannot be combined with dispersed flights.
+    excluded: keyword of the option that cannot be combined with dispersed flights.
+
+    It is called before anything is planned.
     """
     if args.flights is None:
         return

@@ -376,7 +376,7 @@ def watch_stop_signals() -> Iterator[Callable[[], bool]]:
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:
-        """Note that a signal to stop has arrived."""
+        """Record that a signal to stop has arrived."""
         nonlocal should_stop
         should_stop = True
 

@@ -1,4 +1,4 @@
-"""Output of a command: standard output, which survives a closed pipe, progress and the answer."""
+"""Output of a command: text on standard output, also after a closed pipe, progress, and the answer as JSON."""
 
 import argparse
 import contextlib
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 
 class _SafeStream(io.TextIOBase):
-    """Text stream that escapes control characters before it writes to another stream.
+    """Text stream that escapes control characters and writes the text to an underlying stream.
 
-    plain: the other stream, for text that moves the cursor.
+    plain: the underlying stream, to which text that moves the cursor is written directly.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -111,7 +111,7 @@ def _with_stream_name(error: OSError) -> OSError:
 
 
 def open_standard_streams() -> None:
-    """Open those standard streams that are closed, and let all three accept any text.
+    """Open the standard streams that are closed, and let output and error stream accept any text.
 
     If a stream stayed closed, the next opened file would get its descriptor, and text printed by a library would go
     into that file.
@@ -182,9 +182,9 @@ _MAX_BYTES = 20_000
 
 
 class _LastDuration(NamedTuple):
-    """Duration of the last stage of a kind that was run on this machine.
+    """Duration of the last stage of its kind that was run on this machine.
 
-    per_unit: seconds per unit of work, 0 if its units are unknown.
+    per_unit: seconds per unit of work, 0 if the number of units is unknown.
     total: seconds for the whole stage.
     """
 
@@ -200,8 +200,8 @@ def _durations_file() -> Path:
     return Path(user_cache_dir("planfly")) / "durations.json"
 
 
-def _last_durations() -> dict[str, _LastDuration]:
-    """Read the duration of the last stage of each kind; empty if the file is missing or invalid."""
+def _read_durations() -> dict[str, _LastDuration]:
+    """Return the stored duration of the last stage of each kind, by kind; empty without a valid file."""
     durations = {}
     with contextlib.suppress(OSError, ValueError, RecursionError):
         stored_durations = json.loads(read_at_most(_durations_file(), _MAX_BYTES, "durations"))
@@ -213,8 +213,8 @@ def _last_durations() -> dict[str, _LastDuration]:
 
 
 def _write_duration(kind: str, duration: _LastDuration) -> None:
-    """Store the duration of the last stage of a kind; ignore an error in writing the file."""
-    text = json.dumps(_last_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
+    """Store the duration of the last stage of a kind; if the file cannot be written, do nothing."""
+    text = json.dumps(_read_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
     with contextlib.suppress(OSError):
         _durations_file().parent.mkdir(parents=True, exist_ok=True)
         write_atomically(_durations_file(), text)
@@ -258,6 +258,8 @@ class _TimeLeft:
     def estimate(self, done: float, total: float) -> str:
         """Record the work done, and return the time left as text.
 
+        done, total: units of work; a total of 0 is unknown.
+
         The text is "" if the work is done, if the total is unknown, or if there was no progress since the first report.
         """
         if self._first_report is None:
@@ -272,7 +274,7 @@ class _TimeLeft:
 
         remaining_units: units of work still to be done, 0 if unknown.
         """
-        last_duration = _last_durations().get(self._kind)
+        last_duration = _read_durations().get(self._kind)
         if last_duration is not None and remaining_units > 0.0 and last_duration.per_unit > 0.0:
             return f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the rate of the last run"
         if last_duration is not None:
@@ -320,8 +322,11 @@ def _duration_text(seconds: float) -> str:
 
 @contextmanager
 def progress(title: str, kind: str = "") -> Iterator[Advance]:
-    """Show the progress of a stage, which reports units done, total and a remark to the yielded function.
+    """Show the progress of a stage during this block.
 
+    Yields the function to which the stage reports its progress: units done, total and a remark.
+
+    title: name of the stage in the display.
     kind: see `planfly.runtime.stages.stage`.  The time left is shown after the remark, unless the remark already states
     it.  Before progress is measured, the display shows how long the last stage of this kind took on this machine, or
     "no estimate".  A total of 0 means that the total is unknown.
@@ -354,7 +359,7 @@ def _join_nonempty(*parts: str) -> str:
 
 
 def _states_time_left(remark: str) -> bool:
-    """Return True if a remark already states the time left, as for resumed or growing work."""
+    """Return True if a remark already states the time left, as remarks on resumed or growing work do."""
     return " left" in remark
 
 
@@ -408,9 +413,9 @@ class _Bar:
 
 
 class _Lines:
-    """Progress lines of a stage without a terminal: one at the start, some at intervals, one at the end.
+    """Progress lines of a stage if standard error is no terminal: at the start, at intervals, and at the end.
 
-    Input that is refused within the first second gets no line.
+    A stage that fails within the first second, as for refused input, prints no line.
     """
 
     def __init__(self, title: str, time_left: _TimeLeft) -> None:
@@ -449,7 +454,7 @@ class _Lines:
                 )
 
     def refresh(self) -> None:
-        """For a stage that reports nothing, print its first line, and later its elapsed time at intervals."""
+        """Print the first line if nothing is reported yet, or the elapsed time after a minute without a line."""
         with self._lock:
             if self._is_over:
                 return
@@ -501,9 +506,7 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 @contextlib.contextmanager
 def redirect_output(args: argparse.Namespace) -> Iterator[None]:
-    """Discard printed lines with --quiet, or keep them out of a JSON answer on standard output.
-
-    With ``--json -`` the lines are printed on standard error.
+    """During this block, discard printed lines with --quiet, or print them on standard error with ``--json -``.
 
     Progress is not shown with --quiet.  Raises PlanflyError if the file of the JSON answer or of the JUnit report
     exists and must not be overwritten, or if another argument names the same file.  A resumed command replaces the
@@ -622,7 +625,7 @@ def write_usage_error_if_requested(
 
 
 def _replace_or_remove(file: Path, text: str) -> None:
-    """Write a file; if that fails, remove the existing file."""
+    """Write a file; if that fails, remove the file of an earlier run, which would be outdated."""
     try:
         write_atomically(file, text)
     except (OSError, PlanflyError):

@@ -272,12 +272,12 @@ def _measured_return(simulated_return: SimulatedReturn) -> MeasuredReturn:
 
 
 def _round_to_tenths(value: float) -> float | None:
-    """Return a number rounded to tenths, or None if it is not finite."""
+    """Return a number rounded to one decimal, or None if it is not finite."""
     return round(value, 1) if math.isfinite(value) else None
 
 
 def glides_entry(result: ReturnsResult) -> GlidesEntry:
-    """Return the JSON entry of all glides after an engine failure, with the place in reach at each second."""
+    """Return the JSON entry of all glides after an engine failure, in ranges with the same place in reach."""
     glides = result.glides
     entries = []
     for glide_range in glides.ranges:

@@ -59,9 +59,9 @@ def answer_schema(name: str) -> dict[str, Any]:
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the schemas of the objects that an answer may be.
+    """Return the schema of each kind of object that an answer may be, from the schema of the answer.
 
-    There are several if the options choose between several objects.
+    There are several kinds if the command's options choose between them.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']

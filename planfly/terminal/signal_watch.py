@@ -31,9 +31,9 @@ _COMPILER_PACKAGES = ("numba", "llvmlite")
 
 @contextlib.contextmanager
 def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
-    """Raise `Interrupted` for SIGINT and SIGTERM, and end a process that does not react.
+    """During this block, raise `Interrupted` for SIGINT and SIGTERM, and end the process by force if it does not end.
 
-    The process is ended by force ``grace`` seconds after a signal.
+    grace: time after a signal at which the process is ended by force, s.
 
     Python's signal handlers may run late: compiled code and compilers delay them, and waits for other processes can be
     long.  Therefore a thread kills the children of this process, removes its unfinished files, and ends it with exit
@@ -112,9 +112,11 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 
 
 def _end_process_after_signal(read_number: Callable[[int], bytes], received: list[int], grace: float) -> None:
-    """Wait for the first signal, give the command time to end, and end the process.
+    """Wait for the first signal, give the command time to end by itself, and end the process.
 
-    The number of the signal is appended to `received`.
+    read_number: function that reads signal numbers as bytes.
+    received: list to which the number of the signal is appended.
+    grace: time to end, s; time in which the main thread waits for a processor is not included.
     """
     while (number := read_number(1)[0]) not in ENDING_SIGNALS:
         pass

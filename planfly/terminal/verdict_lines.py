@@ -89,9 +89,9 @@ def verdict_lines(
 
 
 def _rule_summary(rule: RuleFindings) -> str:
-    """Return the counts of a rule's findings and the finding closest to its limit.
+    """Return a text with the counts of a rule's findings, and the finding closest to its limit.
 
-    If no finding of the rule was judged, the text states the reason.
+    If no finding of the rule was judged, return the reason.
     """
     if not rule.judged_count:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"

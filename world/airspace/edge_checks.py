@@ -1,4 +1,4 @@
-"""Limit corners, near edges and crossings of a zone's outline before it is checked or repaired.
+"""Limit the corners of a zone's outline, its edges in one place and its crossings, before a check or repair.
 
 A repair stores every crossing: a star of 2,000 corners, 80 kB in a file, has 2,000,000 crossings and took 1.7 GB.
 """
@@ -44,7 +44,7 @@ def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = Tr
 
 
 def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, *, closed: bool = True) -> int:
-    """Return the number of pairs of edges that cross or touch; counting stops above ``max_count``.
+    """Return the number of pairs of edges that cross or touch; if above ``max_count``, it may be incomplete.
 
     rings, closed: as for `check_edges`.
 
@@ -66,7 +66,10 @@ def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, 
 
 
 def _make_edges(rings: Sequence[Sequence[Sequence[float]]], closed: bool) -> tuple[Any, Any]:
-    """Return the edges of rings as lines, and for each edge the index of the next edge in its ring."""
+    """Return the edges of rings as shapely lines, and for each edge the index of the next edge in its ring.
+
+    closed: False for a single open line, which has no edge from its last corner to its first.
+    """
     corners: list[Floats] = [np.asarray(ring, dtype=np.float64).reshape(-1, 2) for ring in rings]
     starts, ends = np.concatenate(corners), np.concatenate([np.roll(ring, -1, axis=0) for ring in corners])
     sizes = np.cumsum([0, *map(len, corners)])

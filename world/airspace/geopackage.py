@@ -22,7 +22,9 @@ _WGS84_CODE = 4326
 
 
 def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the location of each feature in a file, and the feature as GeoJSON in longitude and latitude.
+    """Yield (location, feature) for each feature of a file, as GeoJSON in longitude and latitude.
+
+    The location is the table and the row, for messages.
 
     Raises ScenarioError for a file that cannot be read as a GeoPackage, and for an invalid geometry.
     """
@@ -42,7 +44,7 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
                 for number, row in enumerate(cursor, 1):
                     location = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
-                    shape = _read_shape(columns.pop(column, None), code, f"{source}: {location}")
+                    shape = _decode_geometry(columns.pop(column, None), code, f"{source}: {location}")
                     # Only text and numbers; a column "identifier" or "title" is also added under the key
                     # "name".
                     plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
@@ -77,7 +79,7 @@ def _crs_definition(database: sqlite3.Connection, system: int) -> str:
     return str(definition)
 
 
-def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
+def _decode_geometry(blob: Any, code: str, source: str) -> dict[str, Any]:
     """Convert a GeoPackage geometry to GeoJSON in longitude and latitude.
 
     code: coordinate reference system as `_crs_definition` returns it.

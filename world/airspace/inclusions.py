@@ -1,4 +1,4 @@
-"""Unite inclusion zones, for an autopilot that stays inside any of them."""
+"""Unite inclusion zones, for an autopilot that only has to be inside one of them."""
 
 import math
 from collections.abc import Sequence

@@ -43,15 +43,16 @@ _NO_LIMIT = {
 
 @dataclass(slots=True)
 class _Block:
-    """Airspace that is being read: the contents of its lines up to the current line, in degrees and m.
+    """Airspace that is being read, as stated by its lines so far, in degrees and m.
 
-    line: number of the line with which it begins.
-    kind: its type (AY).
+    line: number of its first line.
+    airspace_class, kind: its class (AC) and its type (AY).
     limits: limits in openAIP's form, by the keys "lowerLimit" and "upperLimit".
-    corners: corners and arcs of its outline, latitude and longitude.
-    airway, width: points of an airway, and its width.
-    circle: center and radius.
-    centre, clockwise: variables for the arcs and circles that follow.
+    times: periods in which it is active (AA), as `world.airspace.zone_times` reads them.
+    corners: corners of its outline, latitude and longitude; arcs are included as chords.
+    airway, width: points of an airway (latitude and longitude), and its width, m.
+    circle: centre and radius, m.
+    centre, clockwise: current values of the variables X and D, for the arcs and circles that follow.
     """
 
     line: int
@@ -179,7 +180,10 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
 
 
 def _read_times(block: _Block, text: str) -> None:
-    """Add a period in which the airspace is active; NONE means that a NOTAM states the period."""
+    """Add a period in which the airspace is active (AA); the text NONE means by NOTAM.
+
+    Raises ValueError for an invalid period.
+    """
     if text.upper() == "NONE":
         block.times.append(BY_NOTAM)
         return
@@ -189,10 +193,10 @@ def _read_times(block: _Block, text: str) -> None:
 
 
 def _limit_reader(key: str) -> Callable[[_Block, str], None]:
-    """Return the function that reads AL or AH and stores the limit under a key, in openAIP's form."""
+    """Return a function that reads the text of AL or AH, and stores the limit under a key, in openAIP's form."""
 
     def read(block: _Block, text: str) -> None:
-        """Store the limit under the key, unless it is the ground or no limit.
+        """Store the limit under the key; store nothing for a text that means no limit, such as GND for AL.
 
         Raises ValueError if it is already stored, and for any other text.
         """
@@ -238,7 +242,10 @@ def _read_circle(block: _Block, text: str) -> None:
 
 
 def _read_arc_by_bearings(block: _Block, text: str) -> None:
-    """Add an arc about the block's centre, given by its radius and two bearings (DA)."""
+    """Add an arc about the block's centre, given by its radius and two bearings (DA).
+
+    Raises ValueError for an invalid text, or without a centre.
+    """
     parts = text.split(",")
     if len(parts) != 3:
         raise ValueError("expected radius, first and last bearing: 5, 270, 290")
@@ -250,7 +257,10 @@ def _read_arc_by_bearings(block: _Block, text: str) -> None:
 
 
 def _read_arc_by_points(block: _Block, text: str) -> None:
-    """Add an arc about the block's centre, given by its two end points (DB)."""
+    """Add an arc about the block's centre, given by its two end points (DB).
+
+    Raises ValueError for an invalid text, or without a centre.
+    """
     ends = [_parse_position(match[0]) for match in _COORDINATE.finditer(text)]
     if len(ends) != 2:
         raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
@@ -264,7 +274,10 @@ def _read_arc_by_points(block: _Block, text: str) -> None:
 
 
 def _corner_reader(name: str) -> Callable[[_Block, str], None]:
-    """Return the function that reads DP or DY and adds the position to a list of the airspace."""
+    """Return a function that reads the position in DP or DY, and adds it to a list of the airspace.
+
+    name: field of `_Block` with the list.
+    """
 
     def read(block: _Block, text: str) -> None:
         """Add the position to the list of the airspace."""
@@ -281,10 +294,10 @@ def _add_corners(corners: list[_Position], added_corners: list[_Position]) -> No
 
 
 def _text_reader(name: str) -> Callable[[_Block, str], None]:
-    """Return the function that reads AN or AY and stores the text in a field of the airspace."""
+    """Return a function that stores the text of AN or AY in the named field of the airspace."""
 
     def read(block: _Block, text: str) -> None:
-        """Store the text in the field of the airspace."""
+        """Store the text in the field; a text other than a name in capitals."""
         setattr(block, name, text if name == "name" else text.upper())
 
     return read
@@ -321,7 +334,7 @@ def _parse_number(text: str) -> float:
 
 
 def _parse_length(text: str) -> float:
-    """Parse a length in nautical miles; return it in m."""
+    """Parse a length in nautical miles; return it in m. Raises ValueError for any other text."""
     length = _parse_number(text)
     if length > MAX_LENGTH_NMI:
         raise ValueError(f"allowed 0..{MAX_LENGTH_NMI:g} nautical miles")
@@ -329,7 +342,7 @@ def _parse_length(text: str) -> float:
 
 
 def _parse_position(text: str) -> _Position:
-    """Parse a latitude and longitude, degrees."""
+    """Parse a position; return its latitude and longitude, degrees. Raises ValueError for any other text."""
     match = _COORDINATE.fullmatch(text.strip())
     if match is None:
         raise ValueError("expected a position: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
@@ -339,7 +352,10 @@ def _parse_position(text: str) -> _Position:
 
 
 def _parse_degrees(text: str, max_degrees: float) -> float:
-    """Parse an angle with optional minutes and seconds, such as 45:40:30; return degrees."""
+    """Parse an angle with optional minutes and seconds, such as 45:40:30; return degrees.
+
+    Raises ValueError for any other text, and for more than ``max_degrees``.
+    """
     parts = [_parse_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
         raise ValueError("expected degrees, and minutes and seconds of at most 60")
@@ -361,6 +377,7 @@ def _arc_positions(
 ) -> list[_Position]:
     """Return positions along an arc, both ends included, with chords within `ARC_BEND` of the arc.
 
+    centre: latitude and longitude, degrees.
     radii: radius at the first and at the last bearing, m; the radius changes linearly between them.
     first_bearing, last_bearing: degrees; equal bearings mean a full circle.
     """

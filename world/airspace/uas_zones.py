@@ -134,7 +134,7 @@ def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: s
 
 
 def _flatten_geometries(geometry: Any) -> Iterator[Any]:
-    """Yield a geometry, or the geometries in a collection and in the collections that it contains."""
+    """Yield a geometry itself, or every geometry of a (possibly nested) collection."""
     parts = geometry.get("geometries") if isinstance(geometry, dict) else None
     if isinstance(parts, list):
         for part in parts:
@@ -183,7 +183,9 @@ def _parse_limit(value: Any, unit: Any, datum: Any, limit_name: str, source: str
     """Convert a vertical limit to openAIP's form: value, unit and referenceDatum; None for no limit.
 
     value, unit, datum: values of the file.
-    limit_name: "lower" or "upper".
+    limit_name: "lower" or "upper", for messages.
+
+    Raises ScenarioError for invalid values.
     """
     if value is None or value == "":
         return None
@@ -204,7 +206,7 @@ def _parse_limit(value: Any, unit: Any, datum: Any, limit_name: str, source: str
 
 
 def _parse_rings(coordinates: Any, source: str) -> list[list[list[float]]]:
-    """Convert a polygon's coordinates to rings of [latitude, longitude]."""
+    """Convert a polygon's coordinates to rings of [latitude, longitude]. Raises ScenarioError for invalid values."""
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
@@ -223,7 +225,10 @@ def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _one_line_name(value: Any) -> str:
-    """Return a zone's name in one line; from a list of texts, the first English text or else the first."""
+    """Return a zone's name in one line of up to 80 characters; "" for anything but text.
+
+    From a list of texts by language, the first English text is taken, or else the first text.
+    """
     if isinstance(value, list):
         texts = [
             text_entry
@@ -271,8 +276,8 @@ def _period_texts(applicability: Any, source: str) -> list[str]:
 def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
     """Parse a date and time; return it in UTC, or None for an empty value.
 
-    extreme_offset: shift from local time to UTC for a time without a UTC offset, in the time zone that makes the
-        period longest.
+    extreme_offset: shift from local time to UTC that is assumed for a time without a UTC offset: the shift of the
+        time zone that makes the period longest.
     """
     if value is None or value == "":
         return None
@@ -322,6 +327,6 @@ def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
 
 
 def _value_error(source: str, location: str, field: str, allowed: str) -> ScenarioError:
-    """Return the error for a field at a location of a file."""
+    """Return the error for a field at a location of a file; ``location`` is "" if ``source`` includes it."""
     label = f"{source}: {location}" if location else source
     return ScenarioError(f"{label}: {field}: {allowed}", file=source, field=field, allowed=allowed)

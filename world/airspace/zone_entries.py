@@ -129,9 +129,9 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return a limit in a form in which limits can be compared; None for an invalid limit.
+    """Return a limit as (is above ground, value in m), which can be compared; None for an invalid limit.
 
-    The form is True for a height above ground, and the limit's value, m.
+    limit: limit in openAIP's form.
     """
     if not isinstance(limit, dict):
         return None

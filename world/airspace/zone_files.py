@@ -252,6 +252,8 @@ def _ceiling_entry(polygon: _Element, heights: list[float], source: str) -> tupl
     """Return the [[zones]] key of a KML polygon's ceiling and its height, m; ("", 0) without a ceiling.
 
     heights: heights of the polygon's corners, m.
+
+    Raises ScenarioError for a polygon that is above the ground and not extruded, and for a ceiling that is not level.
     """
     mode = _kml_text(polygon, "altitudeMode") or "clampToGround"
     if mode == "clampToGround":
@@ -270,7 +272,10 @@ def _ceiling_entry(polygon: _Element, heights: list[float], source: str) -> tupl
 
 
 def _parse_positions(element: _Element, source: str) -> list[tuple[float, float, float]]:
-    """Return longitude, latitude and height (0 if not stated) of each position in an XML element."""
+    """Return longitude, latitude (deg) and height (m, 0 if not stated) of each position in an XML element.
+
+    Raises ScenarioError for invalid coordinates.
+    """
     positions = []
     for coordinates in _find_descendants(element, "coordinates"):
         for position in (coordinates.text or "").split():
@@ -312,7 +317,7 @@ MAX_FILE_CORNERS = 1_500_000
 
 @dataclass(slots=True)
 class FileZones:
-    """Zones of a file, and one line for each kind of change or omission made when the file was read."""
+    """Zones of a file, and notes: one line for each kind of change or omission made on reading."""
 
     zones: list[ZoneTable] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -442,7 +447,10 @@ def _check_size(path: Path, source: str) -> None:
 
 
 def _read_text(path: Path, source: str, *, openair: bool) -> str:
-    """Return the text of a file; decode an OpenAir file that is not UTF-8 as Latin-1."""
+    """Return the text of a file, decoded as UTF-8, or an OpenAir file as Latin-1 if it is not UTF-8.
+
+    Raises ScenarioError for a file that is missing, too large or not text.
+    """
     try:
         _check_size(path, source)
         data = path.read_bytes()

@@ -1,4 +1,4 @@
-"""Compiled distances to zones from a place and along a segment, exact for straight edges and circles.
+"""Compute distances of positions and segments from zones in compiled code, exactly for straight edges and circles.
 
 Zones are records, and the edges of all polygons are records of one array, so that kernels read zones sequentially.
 """
@@ -97,10 +97,7 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
 
 
 def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float, bool]:
-    """Return the height of a floor or ceiling, m, and True if it is a height above ground.
-
-    Without a level the result is the default height, and False.
-    """
+    """Return (height in m, is above ground) of a floor or ceiling; without a level, (default height, False)."""
     return (default_height, False) if level is None else (level.height, level.datum == "ground")
 
 
@@ -108,6 +105,7 @@ def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float
 def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
     """Return the horizontal distance between a box on the map and the bounding box of zone z, m.
 
+    z: index of the zone in ``records``.
     west, east, south, north: edges of the box, m.
 
     The distance is 0 if the boxes overlap.
@@ -166,7 +164,7 @@ def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tup
 
 @compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:
-    """Return the horizontal distance from a position to the outline of zone z, m; negative inside."""
+    """Return the horizontal distance from a position (east, north, m) to the outline of zone z, m; negative inside."""
     distance, _ = nearest_edge(records, z, east, north)
     return distance
 
@@ -193,7 +191,7 @@ def height_outside_band(zone: Record, up: float, ground: float) -> float:
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the fraction of the segment a-b that is inside zone z, within a part of the segment.
+    """Return the fraction of the segment a-b that is inside zone z on the map, within a part of the segment.
 
     ax, ay, bx, by: ends of the segment, east and north, m.
     begin_fraction, end_fraction: limits of the part, as fractions of the segment; 0 and 1 for the whole segment.

@@ -58,7 +58,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """One zone.
+    """Airspace zone: a shape on the map between a floor and a ceiling.
 
     name: name for messages, one line.
     kind: "exclusion" to keep out of, "inclusion" to stay in.
@@ -141,7 +141,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
 
 
 def _check_area(area: float) -> None:
-    """Raise ValueError for an area below the minimum."""
+    """Raise ValueError for an area (m^2) below `MIN_AREA`."""
     if not area >= MIN_AREA:
         raise ValueError(f"encloses only {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 
@@ -204,10 +204,11 @@ def repair_rings(
     rings: rings of [latitude, longitude], the outline first.
     max_crossings: maximum number of crossings.
 
-    Returns the new rings, and the number of edge crossings. Returns None if there is nothing to repair, and no rings
-    for an outline that encloses no area. A ring that is not inside another ring is a part of the area, not a hole. A
-    ring of fewer than three different corners is left out. The area is extended by `REPAIR_MARGIN_DEG` on all sides.
-    Raises ValueError for more crossings than ``max_crossings``, and for too many corners or edges (`check_edges`).
+    Returns the new rings, and the number of edge crossings. Returns None if there is nothing to repair, or if a
+    coordinate is not finite. The list of new rings is empty if they enclose no area.
+    A ring that is not inside another ring is a part of the area, not a hole. A ring of fewer than three different
+    corners is left out. The area is extended by `REPAIR_MARGIN_DEG` on all sides. Raises ValueError for more crossings
+    than ``max_crossings``, and for too many corners or edges (`check_edges`).
 
     >>> repaired, crossings = repair_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
     >>> len(repaired), crossings  # both halves of a bow tie, joined in the middle
@@ -270,7 +271,7 @@ def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
 
 
 def are_holes_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
-    """Return True if all holes are inside the outline; invalid rings are not checked, because `make_polygon` does it.
+    """Return True if all holes are inside the outline, or if a ring is invalid, which `make_polygon` reports.
 
     rings: the outline first, then its holes.
 

@@ -123,12 +123,12 @@ _DEGREE_LENGTH_M = 111_000.0
 
 
 def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return the zones of a file that a flight in an area can meet.
+    """Return the zones of a file that a flight in an area can meet: all inclusions, and the exclusions nearby.
 
     source: name of the file in messages.
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
 
-    They are all inclusions, and the exclusions within `MAX_ZONE_DISTANCE` of the area.
+    Exclusions within `MAX_ZONE_DISTANCE` of the area are nearby.
 
     Raises ScenarioError if an omitted zone has an invalid shape; `make_zones` checks the other zones.
     """
@@ -156,7 +156,7 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
 def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
     """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of an area.
 
-    A zone whose table states positions in m, without latitudes and longitudes, always counts as near.
+    The result is also True for a zone whose table states positions in m, without latitudes and longitudes.
 
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
     """
@@ -212,9 +212,9 @@ def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | 
 def _first_violated_by_records(
     zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None
 ) -> Zone | None:
-    """Return the first zone that a position violates, or None; as `first_violated_zone`, with given records.
+    """Return the result of `first_violated_zone` for zones that are already converted to records.
 
-    records: the same zones as records for kernels.
+    records: the zones as `zone_records` converts them.
     """
     east, north, up = (float(value) for value in point)
     ground_height = math.nan if ground is None else float(ground.height(east, north))
@@ -253,7 +253,7 @@ def zone_rings(zone: Zone) -> tuple[Floats, ...]:
 
 
 def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
-    """Return the parts of a zone, each as its outline and its holes, with rings as in `zone_rings`.
+    """Return the separate parts of a zone, each as (outline, *holes), with rings as `zone_rings` returns them.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> [len(part) for part in zone_parts(zone)]
@@ -282,13 +282,13 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
     return [tuple(part) for part in parts]
 
 
-def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
+def level_altitudes(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
     """Return the altitude of a floor or a ceiling above each point of the ground, m AMSL, (n,).
 
     ground: altitudes of the ground, m AMSL, (n,).
     default: altitude for a level of None, m AMSL.
 
-    >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
+    >>> level_altitudes(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
     """
     if level is None:
@@ -314,7 +314,7 @@ def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, defaul
     for ring in zone_rings(zone):
         ground = np.full(len(ring), default_floor) if terrain is None else terrain.height(ring[:, 0], ring[:, 1])
         ground = np.where(np.isfinite(ground), ground, default_floor)
-        bottom = np.maximum(level_heights(zone.floor, ground, -np.inf), ground)
-        top = np.maximum(level_heights(zone.ceiling, ground, default_ceiling), bottom)
+        bottom = np.maximum(level_altitudes(zone.floor, ground, -np.inf), ground)
+        top = np.maximum(level_altitudes(zone.ceiling, ground, default_ceiling), bottom)
         walls.append(np.stack([np.column_stack([ring, bottom]), np.column_stack([ring, top])], axis=1))
     return walls

@@ -58,17 +58,17 @@ class Forecast:
 
     @property
     def first_time(self) -> datetime:
-        """First time of the forecast."""
+        """First time of the forecast, UTC."""
         return datetime.fromtimestamp(float(self.times[0]), UTC)
 
     @property
     def last_time(self) -> datetime:
-        """Last time of the forecast."""
+        """Last time of the forecast, UTC."""
         return datetime.fromtimestamp(float(self.times[-1]), UTC)
 
     @property
     def is_single_place(self) -> bool:
-        """Return True if the forecast is for one place."""
+        """True if the forecast is for a single place, without a grid."""
         return len(self.latitudes) == len(self.longitudes) == 1
 
     @property
@@ -79,14 +79,17 @@ class Forecast:
         return float(max(north, east)) * _KM_PER_DEGREE
 
     def step_at(self, departure: datetime) -> tuple[datetime, datetime]:
-        """Return the two successive times of the forecast between which a departure lies."""
+        """Return the two successive times of the forecast between which a departure lies.
+
+        For a departure before the first or after the last time, they are the first two or the last two times.
+        """
         after = int(np.clip(np.searchsorted(self.times, departure.timestamp(), side="right"), 1, len(self.times) - 1))
         return (
             datetime.fromtimestamp(float(self.times[max(0, after - 1)]), UTC),
             datetime.fromtimestamp(float(self.times[after]), UTC),
         )
 
-    def end_of_steps(self, departure: datetime) -> datetime:
+    def interpolation_end(self, departure: datetime) -> datetime:
         """Return the time up to which the wind after a departure can be interpolated.
 
         It is the time before the first step longer than `LONGEST_STEP`, or the last time of the forecast if there is
@@ -97,7 +100,10 @@ class Forecast:
         return self.last_time if not len(long_steps) else datetime.fromtimestamp(float(times[long_steps[0]]), UTC)
 
     def field_from(self, departure: datetime, member: int = 0) -> WindField:
-        """Return the wind of one member of the ensemble as a field with times in s after the departure."""
+        """Return the wind of one ensemble member from a departure until `LONGEST_FLIGHT_S` later.
+
+        The times of the field are s after the departure.
+        """
         field = WindField(
             self.times - departure.timestamp(),
             self.latitudes,
@@ -108,12 +114,12 @@ class Forecast:
         return field.between(0.0, LONGEST_FLIGHT_S)
 
     def facts(self, departure: datetime) -> "ForecastFacts":
-        """Return the source and extent of the forecast for messages, for one departure."""
+        """Return the source and extent of the forecast, as messages state them for a departure."""
         return ForecastFacts(
             source=self.source,
             issued=self.issued,
             departure=departure,
-            last_time=self.end_of_steps(departure),
+            last_time=self.interpolation_end(departure),
             grid_km=self.grid_km,
             levels=self.altitudes.shape[-1],
             lowest_amsl=float(self.altitudes[..., 0].max()),
@@ -160,11 +166,11 @@ class ForecastFacts:
 
     @property
     def is_old(self) -> bool:
-        """Return True if the forecast is older than `OLD_AGE` at the departure."""
+        """True if the forecast is older than `OLD_AGE` at the departure; False if the time of issue is unknown."""
         return self.age is not None and self.age > OLD_AGE
 
     def describe(self) -> str:
-        """Return the forecast's source, time of issue, age, grid and levels as a clause.
+        """Return the forecast's source, time of issue, age, grid and levels as text for a message.
 
         >>> noon = datetime(2026, 5, 1, 12, tzinfo=UTC)
         >>> ForecastFacts("a.nc", noon, noon, noon, 2.2, 3, 10.0, 900.0, (0.0, 0.0, 1.0, 1.0)).describe()

@@ -1,4 +1,4 @@
-"""Read the forecast of Open-Meteo's API: hourly winds at heights above ground and on pressure levels, as JSON."""
+"""Read a forecast in the JSON of Open-Meteo's API: hourly winds at heights above ground and on pressure levels."""
 
 import re
 from collections.abc import Mapping
@@ -25,6 +25,7 @@ _SPEED_NAME = re.compile(r"^wind_?speed_(\d+)(m|hPa)$")
 class _Place(NamedTuple):
     """Winds at one place.
 
+    latitude, longitude: deg.
     times: (t,) s since 1970.
     altitudes: (t, k) m AMSL, ascending.
     velocities: (t, k, 2) m/s.
@@ -51,9 +52,11 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     entries = content if isinstance(content, list) else [content]
     for entry in entries:
         if isinstance(entry, dict) and entry.get("error") and "hourly" in entry:
-            raise _fault(path, "error", f"the service answered with an error: {str(entry.get('reason', ''))[:100]}")
+            raise _make_error(
+                path, "error", f"the service answered with an error: {str(entry.get('reason', ''))[:100]}"
+            )
     if not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise _fault(path, "hourly", "expected the answer of Open-Meteo's API, one object or a list of objects")
+        raise _make_error(path, "hourly", "expected the answer of Open-Meteo's API, one object or a list of objects")
     places = [_read_place(path, entry, ground_amsl) for entry in entries]
     first = places[0]
     latitudes = np.unique([place.latitude for place in places])
@@ -66,7 +69,7 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
         place.altitudes.shape != first.altitudes.shape or not np.array_equal(place.times, first.times)
         for place in places
     ):
-        raise _fault(
+        raise _make_error(
             path, "latitude, longitude", "several places must form a regular grid, with the same times and levels"
         )
     order = np.lexsort((place_longitudes, [place.latitude for place in places]))
@@ -76,7 +79,7 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     )
     velocities = np.stack([places[k].velocities for k in order], axis=1).reshape(*altitudes.shape, 2)
     if len(places) > 1 and min(shape) < 2:
-        raise _fault(
+        raise _make_error(
             path, "latitude, longitude", "several places must form a grid of at least two rows and two columns"
         )
     has_elevation = all("elevation" in entry for entry in entries)
@@ -92,8 +95,8 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     )
 
 
-def _fault(path: Path, field: str, allowed: str) -> ForecastError:
-    """Return the error for a field of a file."""
+def _make_error(path: Path, field: str, allowed: str) -> ForecastError:
+    """Make the error about a field of a file; ``allowed`` states the expected values."""
     return ForecastError(f"{path}: {field}: {allowed}", file=str(path), field=field, allowed=allowed)
 
 
@@ -102,14 +105,16 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 
     entry: JSON object of the place.
     ground_amsl: altitude of the ground, m, if the object states no elevation.
+
+    Raises ForecastError for missing or invalid values.
     """
     hourly, units = entry.get("hourly"), entry.get("hourly_units")
     if not isinstance(hourly, dict) or not isinstance(units, dict):
         reason = f": {entry['reason']}" if isinstance(entry.get("reason"), str) else ""
-        raise _fault(path, "hourly", f"hourly winds and hourly_units are missing{reason[:200]}")
-    latitude = _number(path, entry, "latitude", -90.0, 90.0)
-    longitude = _number(path, entry, "longitude", -180.0, 360.0)
-    ground = _number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
+        raise _make_error(path, "hourly", f"hourly winds and hourly_units are missing{reason[:200]}")
+    latitude = _read_number(path, entry, "latitude", -90.0, 90.0)
+    longitude = _read_number(path, entry, "longitude", -180.0, 360.0)
+    ground = _read_number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
     times = _read_times(path, hourly, units, entry)
     # Names of the variables of each level: wind speed, wind direction, and geopotential height ("" for a level at a
     # height above ground).
@@ -118,10 +123,10 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
         name, level = match.group(), f"{match.group(1)}{match.group(2)}"
         directions = [text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly]
         if not directions:
-            raise _fault(path, f"hourly.wind_direction_{level}", f"missing, although {name} is there")
+            raise _make_error(path, f"hourly.wind_direction_{level}", f"missing, although {name} is there")
         height = "" if match.group(2) == "m" else f"geopotential_height_{level}"
         if height and height not in hourly:
-            raise _fault(path, f"hourly.{height}", f"missing, although {name} is there")
+            raise _make_error(path, f"hourly.{height}", f"missing, although {name} is there")
         all_levels.append((name, directions[0], height))
     # The values of a level that a model does not have are null at all times.
     null_names = {
@@ -132,7 +137,7 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
     levels = [names for names in all_levels if null_names.isdisjoint(filter(None, names))]
     if not levels:
         allowed = "no wind: wind_speed_10m and wind_direction_10m, or speed and direction of other levels, are needed"
-        raise _fault(path, "hourly", allowed)
+        raise _make_error(path, "hourly", allowed)
     # Times up to the last one at which all columns have a value. A model that ends before the requested days has
     # null at all later times.
     columns = [hourly[name] for level in levels for name in level if name]
@@ -142,14 +147,14 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
         count -= 1
     groups = []
     for speed_name, direction_name, height_name in levels:
-        speeds = _column(path, hourly, units, speed_name, count, SPEED_UNITS)
+        speeds = _read_column(path, hourly, units, speed_name, count, SPEED_UNITS)
         if (speeds < 0.0).any() or (speeds > MAX_WIND_MPS).any():
             shown = f"{speeds.min():.4g} to {speeds.max():.4g} m/s"
-            raise _fault(path, f"hourly.{speed_name}", f"{shown}: allowed 0..{MAX_WIND_MPS:g} m/s")
-        courses = np.radians(_column(path, hourly, units, direction_name, count, DIRECTION_UNITS))
+            raise _make_error(path, f"hourly.{speed_name}", f"{shown}: allowed 0..{MAX_WIND_MPS:g} m/s")
+        courses = np.radians(_read_column(path, hourly, units, direction_name, count, DIRECTION_UNITS))
         kind: LevelKind = "pressure" if height_name else "height"
         if height_name:
-            heights = _column(path, hourly, units, height_name, count, HEIGHT_UNITS)
+            heights = _read_column(path, hourly, units, height_name, count, HEIGHT_UNITS)
         else:
             heights = np.full(count, float(re.findall(r"\d+", speed_name)[0]))
         winds = np.stack([-speeds * np.sin(courses), -speeds * np.cos(courses)], axis=-1)
@@ -159,52 +164,64 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 
 
 def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry: dict[str, Any]) -> Floats:
-    """Return the times of the hourly variables, (t,) s since 1970 in UTC."""
+    """Return the times of the hourly variables, (t,) s since 1970 in UTC.
+
+    entry: object of the place, whose UTC offset applies to times without one.
+
+    Raises ForecastError for missing, invalid or unordered times.
+    """
     values = hourly.get("time")
     if not isinstance(values, list) or not values:
-        raise _fault(path, "hourly.time", "missing: a list of times is needed")
+        raise _make_error(path, "hourly.time", "missing: a list of times is needed")
     try:
         if units.get("time") == "unixtime":
             times = np.array([float(value) for value in values])
         else:
-            zone = timezone(timedelta(seconds=_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0)))
+            zone = timezone(
+                timedelta(seconds=_read_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0))
+            )
             read_times = [datetime.fromisoformat(value) for value in values]
             times = np.array([(time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in read_times])
     except (TypeError, ValueError, OverflowError, AttributeError):
-        raise _fault(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
+        raise _make_error(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise _fault(path, "hourly.time", "the times are not in ascending order")
+        raise _make_error(path, "hourly.time", "the times are not in ascending order")
     return times
 
 
-def _number(
+def _read_number(
     path: Path, entry: dict[str, Any], name: str, low: float, high: float, default: float | None = None
 ) -> float:
-    """Return the number under a name of an entry. Raises ForecastError if it is missing or outside its limits."""
+    """Return a number of an entry by its name, or the default if it is missing.
+
+    Raises ForecastError if it is missing without a default, or not between ``low`` and ``high``.
+    """
     value = entry.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise _fault(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
+        raise _make_error(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
     return float(value)
 
 
-def _column(
+def _read_column(
     path: Path, hourly: dict[str, Any], units: dict[str, Any], name: str, count: int, factors: Mapping[str, float]
 ) -> Floats:
     """Return the first values of one hourly variable, (count,), converted by the factor of its unit.
 
     units: unit of each variable.
     factors: factor of each allowed unit; the factor of the resulting unit is 1.
+
+    Raises ForecastError for an unknown unit, and for values that are missing or not numbers.
     """
     factor = unit_factor(units.get(name), factors)
     if factor is None:
-        raise _fault(path, f"hourly_units.{name}", f"{units.get(name)!r}: allowed {', '.join(sorted(factors))}")
+        raise _make_error(path, f"hourly_units.{name}", f"{units.get(name)!r}: allowed {', '.join(sorted(factors))}")
     values = hourly[name]
     if not isinstance(values, list) or len(values) != len(hourly["time"]):
-        raise _fault(path, f"hourly.{name}", f"expected {len(hourly['time'])} values, one for each time")
+        raise _make_error(path, f"hourly.{name}", f"expected {len(hourly['time'])} values, one for each time")
     values = values[:count]
     if not values:
-        raise _fault(path, f"hourly.{name}", "no values")
+        raise _make_error(path, f"hourly.{name}", "no values")
     for k, value in enumerate(values):
         if isinstance(value, bool) or not isinstance(value, int | float) or not -_MAX_NUMBER < value < _MAX_NUMBER:
-            raise _fault(path, f"hourly.{name}", f"value number {k + 1} is {repr(value)[:40]}; expected a number")
+            raise _make_error(path, f"hourly.{name}", f"value number {k + 1} is {repr(value)[:40]}; expected a number")
     return np.array(values, dtype=np.float64) * factor

@@ -136,7 +136,9 @@ def _call_library(path: Path, function: Callable[[], Any]) -> Any:
 
 
 class _ForecastReader:
-    """Reader of the wind in the xarray datasets of one file; its methods share the axes of the result.
+    """Reader of the wind in the xarray datasets of one file.
+
+    Its methods share the axes of the result: times, latitudes and longitudes.
 
     path: the file.
     box: area around the mission.
@@ -149,7 +151,7 @@ class _ForecastReader:
         self.ground: Floats | None = None
 
     def _error(self, field: str, allowed: str) -> ForecastError:
-        """Return the error for a variable of the file, with the allowed values."""
+        """Make the error about a variable of the file; ``allowed`` states the expected values."""
         return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
 
     def read(self, datasets: Sequence[Any]) -> Forecast:
@@ -181,9 +183,9 @@ class _ForecastReader:
         if not len(common):
             raise self._error("time", "the levels have no time in common")
         self.times = common
-        self.latitudes, self.longitudes = self._axes(arrays[0])
+        self.latitudes, self.longitudes = self._axes_around_box(arrays[0])
         self.ground = self._read_ground(decoded)
-        groups = [self._group(decoded, *pair) for pair in pairs]
+        groups = [self._read_level_group(decoded, *pair) for pair in pairs]
         members = {len(group.velocities) for group in groups} - {1}
         if len(members) > 1:
             stated = " and ".join(map(str, sorted(members)))
@@ -194,7 +196,7 @@ class _ForecastReader:
         altitudes, velocities = merge_levels(groups, self.ground, self.ground_amsl)
         return Forecast(
             source=self.path.name,
-            issued=self._find_issue(decoded),
+            issued=self._find_issue_time(decoded),
             times=self.times,
             latitudes=self.latitudes,
             longitudes=self.longitudes,
@@ -207,9 +209,9 @@ class _ForecastReader:
     # Times.
 
     def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
-        """Return the time dimension of a variable, and its times in s since 1970.
+        """Return the name of a variable's time dimension, and its times in s since 1970.
 
-        The dimension is None for a variable with a single time.
+        The name is None for a variable with a single time. Raises ForecastError without a usable time coordinate.
         """
         times = _time_coordinates(array)
         for name in ("valid_time", *array.dims, "time", *times):
@@ -224,7 +226,7 @@ class _ForecastReader:
             return (str(coordinate.dims[0]) if coordinate.ndim else None), seconds.astype(np.float64)
         raise self._error("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
 
-    def _find_issue(self, decoded: Sequence[Any]) -> datetime | None:
+    def _find_issue_time(self, decoded: Sequence[Any]) -> datetime | None:
         """Return the time at which the forecast was issued, or None if the file does not state it.
 
         decoded: datasets of the file, with decoded times. An analysis of several times has no time of issue.
@@ -242,8 +244,8 @@ class _ForecastReader:
     # ------------------------------------------------------------------
     # Axes.
 
-    def _horizontal(self, array: Any) -> tuple[Any, Any]:
-        """Return the latitude and longitude coordinates of a variable."""
+    def _lat_lon_coordinates(self, array: Any) -> tuple[Any, Any]:
+        """Return the latitude and longitude coordinates of a variable. Raises ForecastError if one is missing."""
         coordinates = []
         for standard_name, names in (("latitude", ("lat", "latitude")), ("longitude", ("lon", "longitude"))):
             for name, coordinate in array.coords.items():
@@ -254,9 +256,13 @@ class _ForecastReader:
                 raise self._error(standard_name, f"missing for {array.name}")
         return coordinates[0], coordinates[1]
 
-    def _axes(self, array: Any) -> tuple[Floats, Floats]:
-        """Return the latitudes and longitudes of the nodes around the box, in ascending order, deg."""
-        latitude, longitude = self._horizontal(array)
+    def _axes_around_box(self, array: Any) -> tuple[Floats, Floats]:
+        """Return the latitudes and longitudes of a variable's nodes around the box, in ascending order, deg.
+
+        For a grid with two-dimensional coordinates, they are the axes of the regular grid to interpolate to. Raises
+        ForecastError if the box is outside the grid.
+        """
+        latitude, longitude = self._lat_lon_coordinates(array)
         if latitude.ndim == 2:
             # Grids with two-dimensional coordinates are interpolated to a regular grid.
             axes = regular_axes(latitude.values, longitude.values, self.box)
@@ -316,19 +322,19 @@ class _ForecastReader:
                 # The ground has no level, and is the same at all times and for all members.
                 is_surface = array.attrs.get("GRIB_typeOfLevel") == "surface" and _is_height(name, array)
                 is_named = bool(_names_of(name, array) & _GROUND_NAMES)
-                if not (is_surface or is_named) or self._level_of(array, name) is not None:
+                if not (is_surface or is_named) or self._find_level(array, name) is not None:
                     continue
                 times = [coordinate.dims for coordinate in _time_coordinates(array).values()]
                 dims = {*(dim for names in times for dim in names), *(dim for dim in array.dims if dim in _MEMBER_DIMS)}
                 first = array.isel(dict.fromkeys(dims, 0), drop=True)
-                heights: Floats = self._values(first.drop_vars(_time_coordinates(first)))[0, 0, ..., 0]
+                heights: Floats = self._read_values(first.drop_vars(_time_coordinates(first)))[0, 0, ..., 0]
                 if not np.isfinite(heights).all():
                     raise self._error(str(name), "values are missing around the mission")
                 return heights * self._height_factor(array)
         return None
 
     def _height_factor(self, array: Any) -> float:
-        """Return the factor that converts a height or a geopotential to m."""
+        """Return the factor that converts a height or a geopotential to m. Raises ForecastError for other units."""
         units = array.attrs.get("units")
         factor = unit_factor(units, HEIGHT_UNITS)
         if factor is None and str(units).replace(" ", "") in GEOPOTENTIAL_UNITS:
@@ -359,7 +365,7 @@ class _ForecastReader:
         if north:
             raise self._error(next(iter(north)), "the eastward wind that belongs to it is missing")
 
-    def _level_of(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
+    def _find_level(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
         """Return the kind of a variable's levels, their dimension, and their values; None without levels.
 
         name: name of the variable, which may state a height above ground.
@@ -400,7 +406,7 @@ class _ForecastReader:
             return "altitude" if is_above_sea else "height"
         return None
 
-    def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
+    def _read_level_group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
         """Read the wind of one pair of variables, with the altitudes or heights of its levels.
 
         datasets: datasets of the file, in which the heights of pressure levels are looked up.
@@ -409,7 +415,7 @@ class _ForecastReader:
         Levels without any value around the mission are left out. Raises ForecastError for a level with only some
         values, for no level at all, and for winds that are not plausible.
         """
-        level = self._level_of(east, east.name)
+        level = self._find_level(east, east.name)
         if level is None:
             raise self._error(
                 str(east.name), "its level is not stated; expected a pressure, a height above ground or an altitude"
@@ -421,17 +427,19 @@ class _ForecastReader:
             if factor is None:
                 stated = array.attrs.get("units")
                 raise self._error(str(array.name), f"units {stated!r}: allowed {', '.join(sorted(SPEED_UNITS))}")
-            components.append(self._values(array, dim) * factor)
+            components.append(self._read_values(array, dim) * factor)
         velocities = np.stack(components, axis=-1)
         attributes = east.attrs
         if attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1:
             # The components are along the axes of the grid, not along east and north.
-            latitude, longitude = self._horizontal(east)
+            latitude, longitude = self._lat_lon_coordinates(east)
             # A regular grid has its axes along east and north.
             if latitude.ndim == 2:
                 rotate_to_north(velocities, latitude.values, longitude.values, self.latitudes, self.longitudes)
         shape = velocities.shape[1:-1]
-        altitudes = np.broadcast_to(self._geopotential(datasets, east) if kind == "pressure" else values, shape)
+        altitudes = np.broadcast_to(
+            self._pressure_level_altitudes(datasets, east) if kind == "pressure" else values, shape
+        )
         is_missing = ~np.isfinite(velocities).all(axis=(0, -1)) | ~np.isfinite(altitudes)
         is_used = ~is_missing.all(axis=(0, 1, 2))
         if not is_used.any():
@@ -453,22 +461,24 @@ class _ForecastReader:
             raise self._error(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {MAX_WIND_MPS:g} m/s")
         return LevelGroup(kind, np.ascontiguousarray(altitudes[..., is_used]), velocities[..., is_used, :])
 
-    def _geopotential(self, datasets: Sequence[Any], wind: Any) -> Floats:
+    def _pressure_level_altitudes(self, datasets: Sequence[Any], wind: Any) -> Floats:
         """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL, from the geopotential height.
 
         wind: variable of the wind.
+
+        Raises ForecastError if no dataset contains the geopotential height of these levels.
         """
-        wind_level = self._level_of(wind, wind.name)
+        wind_level = self._find_level(wind, wind.name)
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
                 if not _is_height(name, array):
                     continue
-                level = self._level_of(array, name)
+                level = self._find_level(array, name)
                 if level is None or wind_level is None or level[0] != "pressure":
                     continue
                 if not np.array_equal(level[2], wind_level[2]):
                     raise self._error(str(name), f"its pressure levels differ from those of {wind.name}")
-                heights: Floats = self._values(array, level[1]).mean(axis=0) * self._height_factor(array)
+                heights: Floats = self._read_values(array, level[1]).mean(axis=0) * self._height_factor(array)
                 rises = np.diff(heights[..., np.argsort(-level[2])], axis=-1)
                 if (rises <= 0.0).any():
                     raise self._error(
@@ -479,15 +489,15 @@ class _ForecastReader:
             str(wind.name), "the geopotential height of its pressure levels is missing (gh, HGT, z): add it to the file"
         )
 
-    def _values(self, array: Any, level_dim: str | None = None) -> Floats:
+    def _read_values(self, array: Any, level_dim: str | None = None) -> Floats:
         """Return the values of a variable around the box at the common times, (m, t, y, x, k).
 
         level_dim: name of the dimension of the levels; None for a single level.
 
-        m is the number of members, and t is 1 for a variable without times.
+        m is the number of members, and t is 1 for a variable without times. Raises ForecastError for another grid.
         """
-        latitude, longitude = self._horizontal(array)
-        axes = self._axes(array)
+        latitude, longitude = self._lat_lon_coordinates(array)
+        axes = self._axes_around_box(array)
         if any(not np.array_equal(*pair) for pair in zip(axes, (self.latitudes, self.longitudes), strict=True)):
             raise self._error(str(array.name), "its grid differs from the grid of the other variables")
         time_dim = None
@@ -563,7 +573,7 @@ def _is_height(name: Any, array: Any) -> bool:
 
 
 def _partner_key(name: str, letter: str) -> str:
-    """Return the name of a wind component without its axis, which is equal for the two components of one wind.
+    """Return the name of a wind component without its axis, so that both components of a wind have the same key.
 
     letter: letter of the axis, "u" or "v".
 

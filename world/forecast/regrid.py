@@ -8,19 +8,19 @@ from world.arrays import Floats, Ints
 
 
 def _near_longitudes(longitudes: Floats, west: float, east: float) -> Floats:
-    """Return longitudes shifted by whole turns to within 180 degrees of the middle of two longitudes, deg."""
+    """Return longitudes (deg) shifted by whole turns to within 180 degrees of the mean of ``west`` and ``east``."""
     center = 0.5 * (west + east)
     wrapped_longitudes: Floats = center + (longitudes.astype(np.float64) - center + 180.0) % 360.0 - 180.0
     return wrapped_longitudes
 
 
 def regular_axes(latitudes: Floats, longitudes: Floats, box: Any) -> tuple[Floats, Floats] | None:
-    """Return the latitudes and longitudes of a regular grid around a box, with the spacing of a given grid.
+    """Return the latitudes and longitudes (deg) of a regular grid around a box, with the spacing of a given grid.
 
     latitudes, longitudes: nodes of the given grid, (r, c) deg.
-    box: south, west, north and east.
+    box: `world.forecast.forecast.Box`.
 
-    Return None if the box is not inside the grid.
+    Returns None if the box is not inside the grid.
     """
     wrapped_longitudes = _near_longitudes(longitudes, box.west, box.east)
     scale = np.cos(np.radians(0.5 * (box.south + box.north)))
@@ -70,7 +70,8 @@ def regrid(values: Floats, latitudes: Floats, longitudes: Floats, rows: Floats, 
 def rotate_to_north(velocities: Floats, latitudes: Floats, longitudes: Floats, rows: Floats, columns: Floats) -> None:
     """Rotate winds from the axes of a projected grid to east and north, in place.
 
-    velocities: (m, t, y, x, k, 2) m/s on the regular grid, along the projected grid's columns and rows.
+    velocities: (m, t, y, x, k, 2) m/s on the regular grid: components along the rows and along the columns of the
+        projected grid.
     latitudes, longitudes: (r, c) deg, of the projected grid's nodes.
     rows, columns: latitudes (y,) and longitudes (x,) of the regular grid, deg.
     """

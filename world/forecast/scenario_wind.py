@@ -44,7 +44,10 @@ _MAX_MEAN_WIND_MPS = 40.0
 
 
 def map_box(origin: GeoOrigin, bounds: Floats) -> Box:
-    """Return the geographic box around a map's bounds (2, 2), deg."""
+    """Return the geographic box (deg) around a map's bounds.
+
+    bounds: [[west, east], [south, north]], (2, 2) m.
+    """
     edges = [np.linspace(float(bounds[k, 0]), float(bounds[k, 1]), 9) for k in range(2)]
     east, north = (grid.ravel() for grid in np.meshgrid(*edges))
     latitudes, longitudes = to_geo(origin, east, north)
@@ -53,14 +56,14 @@ def map_box(origin: GeoOrigin, bounds: Floats) -> Box:
 
 
 def departure_of(at: str) -> datetime:
-    """Return the time of take-off, UTC: the start of a scenario's time span of the flight.
+    """Return the time of take-off, UTC, which is the start of the flight's time span.
 
     at: the time span as text; see `world.airspace.zone_times.parse_span`.
     """
     return parse_span(at)[0].astimezone(UTC)
 
 
-def scenario_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, start_ground: float) -> Forecast:
+def read_table_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, start_ground: float) -> Forecast:
     """Read the forecast that a [wind] table names, for the area of a scenario.
 
     start_ground: ground at the mission's start, m AMSL.
@@ -73,7 +76,7 @@ def scenario_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, sta
 class ForecastSite(NamedTuple):
     """Place of a mission in a forecast.
 
-    origin: of the map.
+    origin: origin of the map.
     ends: start and destination of the mission, (3,) east, north and up, m.
     max_ground: highest ground of the map, m AMSL; -inf without terrain.
     """
@@ -148,7 +151,8 @@ def forecast_wind(
 def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats, altitudes: Floats) -> None:
     """Raise ForecastError if a position of a mission is outside the box or the levels of the forecast.
 
-    The positions must not be too far from the only place of a forecast without a grid.
+    For a forecast of a single place, also raise it if a position is more than `PLACE_RADIUS_M` from this place. A
+    stated wind, without a forecast, covers all positions.
 
     file: file of the forecast, for the message.
     latitudes, longitudes: (n,) deg.
@@ -200,7 +204,7 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
         )
 
 
-def shift_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:
+def with_mean_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:
     """Return a wind with another mean profile; the wind of a forecast keeps its deviations from the mean.
 
     speed: m/s, at the reference altitude.

@@ -37,7 +37,7 @@ MAX_FIELD_NUMBERS = 20_000_000
 class WindField:
     """Wind at the nodes of a grid.
 
-    times: (t,) s, ascending.
+    times: (t,) s, ascending, from any epoch.
     latitudes: (y,) deg, ascending.
     longitudes: (x,) deg, ascending.
     altitudes: (t, y, x, k) m AMSL of each level, ascending along the last axis.
@@ -72,9 +72,9 @@ class WindField:
     def unpacked(cls, numbers: Floats, count: int) -> "WindField":
         """Make a field from the numbers of `packed`.
 
-        count: expected number of numbers.
+        count: expected length of ``numbers``.
 
-        Raises ValueError for another number of numbers, or if they are not a wind field.
+        Raises ValueError for another length, or if the numbers are not a wind field.
         """
         if numbers.size != count or count < _HEADER_SIZE or not np.isfinite(numbers).all():
             raise ValueError("not a wind field")
@@ -111,7 +111,7 @@ class WindField:
         return self.interpolate(seconds, latitudes, longitudes, altitudes)[:, :2]
 
     def between(self, start: float, end: float) -> "WindField":
-        """Return the part of the field that is needed for the wind from `start` to `end` (s)."""
+        """Return the field with only the times that are needed to interpolate the wind from `start` to `end` (s)."""
         times: Sequence[float] = self.times.tolist()
         first = max(0, bisect.bisect_right(times, start) - 1)
         last = min(len(times), bisect.bisect_left(times, end) + 1)
@@ -143,16 +143,16 @@ def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, 
 
 
 @inner
-def _level_number(
+def _interpolate_level_value(
     field: Floats, corner: int, steps: tuple[int, int, int], fractions: tuple[float, float, float], number: int
 ) -> float:
-    """Interpolate one number of a level linearly in time, latitude and longitude, between eight nodes.
+    """Interpolate a level's altitude or wind component linearly in time, latitude and longitude, between eight nodes.
 
     field: numbers of a packed field.
     corner: index in ``field`` of the first node of the cell, on this level.
     steps: differences of the index to the next node in time, latitude and longitude; 0 on an axis of one node.
     fractions: position in the cell along these axes, 0..1.
-    number: `_ALTITUDE`, `_EAST` or `_NORTH`.
+    number: offset of the value in a node: `_ALTITUDE`, `_EAST` or `_NORTH`.
     """
     total = 0.0
     for time in range(2):
@@ -176,7 +176,7 @@ def interpolate_field(
     The resulting altitude is the point's altitude, limited to the levels there.
 
     field: `WindField.packed`.
-    seconds: s on the field's axis of time.
+    seconds: time, s, from the same epoch as the field's times.
     latitude, longitude: deg; the longitude may differ by multiples of 360 deg.
     altitude: m AMSL.
     """
@@ -202,13 +202,13 @@ def interpolate_field(
         column_step if columns > 1 else 0,
     )
     fractions = (time_fraction, row_fraction, column_fraction)
-    low = _level_number(field, corner, steps, fractions, _ALTITUDE)
+    low = _interpolate_level_value(field, corner, steps, fractions, _ALTITUDE)
     level = 0
     fraction = 0.0
     if levels > 1 and altitude > low:
         high = low
         while level < levels - 1:
-            high = _level_number(field, corner + (level + 1) * _NODE_SIZE, steps, fractions, _ALTITUDE)
+            high = _interpolate_level_value(field, corner + (level + 1) * _NODE_SIZE, steps, fractions, _ALTITUDE)
             if high >= altitude:
                 break
             low = high
@@ -218,11 +218,11 @@ def interpolate_field(
     else:
         altitude = low
     below = corner + level * _NODE_SIZE
-    east = _level_number(field, below, steps, fractions, _EAST)
-    north = _level_number(field, below, steps, fractions, _NORTH)
+    east = _interpolate_level_value(field, below, steps, fractions, _EAST)
+    north = _interpolate_level_value(field, below, steps, fractions, _NORTH)
     if fraction > 0.0:
-        east += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _EAST) - east)
-        north += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _NORTH) - north)
+        east += fraction * (_interpolate_level_value(field, below + _NODE_SIZE, steps, fractions, _EAST) - east)
+        north += fraction * (_interpolate_level_value(field, below + _NODE_SIZE, steps, fractions, _NORTH) - north)
     return east, north, altitude
 
 
@@ -274,9 +274,9 @@ class MeanProfile:
 
 
 def without_levels_above(field: WindField, amsl: float) -> WindField:
-    """Return a field without the levels that are above an altitude (m AMSL) everywhere, except for the lowest of them.
+    """Return a field without levels that are not needed up to an altitude (m AMSL).
 
-    That level is needed to interpolate the wind up to the altitude.
+    They are the levels that are above this altitude everywhere, except for the lowest of them.
     """
     lowest = field.altitudes.min(axis=(0, 1, 2))
     count = min(len(lowest), int((lowest <= amsl).sum()) + 1)
@@ -345,7 +345,10 @@ def limit_gradient(gradient: float, speed: float, heights: Floats) -> float:
 
 
 def subtract_profile(field: WindField, profile: MeanProfile, reference_amsl: float) -> WindField | None:
-    """Return the deviation of a wind field from its mean profile; None if the wind is the same everywhere."""
+    """Return the deviation of a wind field from its mean profile.
+
+    Returns None if the profile describes the whole wind: it has no gradient, and the deviations are negligible.
+    """
     deviations = field.velocities - profile.velocities_at(field.altitudes - reference_amsl)
     if profile.gradient == 0.0 and float(np.abs(deviations).max()) < UNIFORM_TOLERANCE_MPS:
         return None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
-from world.airspace.zones_on_map import level_heights, zone_parts, zone_rings, zone_walls
+from world.airspace.zones_on_map import level_altitudes, zone_parts, zone_rings, zone_walls
 from world.terrain import make_gridded_terrain
 
 SQUARE = [(0.0, 0.0), (900.0, 0.0), (900.0, 900.0), (0.0, 900.0)]
@@ -30,9 +30,9 @@ def test_a_hole_goes_with_the_smallest_outline_about_it() -> None:
 
 def test_levels_over_the_ground() -> None:
     ground = np.array([10.0, 40.0])
-    assert level_heights(None, ground, 7.0).tolist() == [7.0, 7.0]
-    assert level_heights(ZoneLevel(120.0, "amsl"), ground, 7.0).tolist() == [120.0, 120.0]
-    assert level_heights(ZoneLevel(120.0, "ground"), ground, 7.0).tolist() == [130.0, 160.0]
+    assert level_altitudes(None, ground, 7.0).tolist() == [7.0, 7.0]
+    assert level_altitudes(ZoneLevel(120.0, "amsl"), ground, 7.0).tolist() == [120.0, 120.0]
+    assert level_altitudes(ZoneLevel(120.0, "ground"), ground, 7.0).tolist() == [130.0, 160.0]
 
 
 def test_walls_stand_on_the_ground_and_end_at_the_ceiling() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from world.errors import ForecastError
 from world.forecast.forecast import Forecast
-from world.forecast.scenario_wind import ForecastSite, check_coverage, forecast_wind, map_box, shift_wind
+from world.forecast.scenario_wind import ForecastSite, check_coverage, forecast_wind, map_box, with_mean_wind
 from world.frames import GeoOrigin
 from world.scenario_tables import WindTable
 
@@ -55,7 +55,9 @@ def test_the_box_around_a_map() -> None:
 def test_the_forecast_ends_before_a_step_of_more_than_six_hours() -> None:
     forecast = made_forecast()
     longer = replace(forecast, times=NOON.timestamp() + 3600.0 * np.array([0.0, 6.0, 13.0, 14.0]))
-    assert [(longer.end_of_steps(NOON + timedelta(hours=h)) - NOON).total_seconds() / 3600 for h in (0, 1, 6, 13)] == [
+    assert [
+        (longer.interpolation_end(NOON + timedelta(hours=h)) - NOON).total_seconds() / 3600 for h in (0, 1, 6, 13)
+    ] == [
         6.0,
         6.0,
         6.0,
@@ -158,7 +160,7 @@ def test_a_field_of_too_many_numbers_is_refused() -> None:
 
 def test_a_shift_to_no_mean_wind_leaves_the_differences_of_the_levels() -> None:
     wind, _ = forecast_wind(TABLE, made_forecast(), NOON.isoformat(), site(), 0)
-    calm = shift_wind(wind, 0.0, wind.from_course, wind.gradient)
+    calm = with_mean_wind(wind, 0.0, wind.from_course, wind.gradient)
     assert calm.field is not None
     assert (calm.speed, calm.gradient) == (0.0, 0.0)
     found = calm.field.velocities_at(0.0, 46.0, 8.0, [100.0, 180.0, 900.0])
