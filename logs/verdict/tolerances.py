@@ -62,7 +62,7 @@ MAX_FLY_BY_OFFSET_RADII = 30.0
 # rad.  The bank, averaged over a second, may exceed the limit by this, because the roll that gusts cause is not part of
 # the turn.
 BANK_TOLERANCE_RAD = math.radians(5.0)
-# m.  The aircraft may get this far outside the planned arc of a turn.
+# m.  A turn may be flown this far outside its arc.
 OVERSHOOT_TOLERANCE_M = 5.0
 # m.  The aircraft has settled after a turn if its distance from the next leg, averaged over a second, is at most this.
 SETTLED_CROSS_TRACK_M = 1.0
