@@ -6,7 +6,7 @@ import shlex
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import complete_aircraft, number_parser, parse_position, with_completer
 from planfly.terminal.command_parser import FLYABLE, NOT_FLYABLE, LineParser, colour_text
-from planfly.terminal.options import add_result_options, add_terrain_option, given_options
+from planfly.terminal.options import add_result_options, add_terrain_option
 from planfly.terminal.output import write_json_if_requested
 
 
@@ -59,7 +59,7 @@ def new(args: argparse.Namespace) -> int:
     """Write the scenario, and plan a path in it; return 4 if the plan is not safe, but keep the file."""
     from planfly.api import drafting, planning
 
-    file = drafting.new_scenario(**given_options(args))
+    file = drafting.new_scenario(**args.options)
     print(f"scenario  {file}")
     if args.terrain is None:
         print("ground    flat, at mean sea level: no elevation file was named (--terrain DEM)")

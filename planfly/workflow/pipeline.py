@@ -19,7 +19,7 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
-from logs.verdict.returns.return_starts import ReturnStarts, return_starts
+from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
@@ -366,11 +366,13 @@ def return_summary(
         return ReturnSummary()
     try:
         world = make_return_world(setup)
-        duration = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
-            duration = float(track.time[-1] - track.time[0])
-        interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
-        starts = return_starts(setup, track, interval, requirements)
+            interval = max(1.0, float(track.time[-1] - track.time[0]) / _SUMMARY_RETURN_COUNT)
+            starts = flown_starts(setup, track, interval)
+        else:
+            duration = setup.path.length / max(1.0, setup.airspeed)
+            interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
+            starts = planned_starts(setup, interval, requirements)
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
