@@ -245,7 +245,6 @@ def add_flight_options(parser: CommandParser) -> None:
     group.add_argument(
         "--engine",
         choices=CHOICES["engine"],
-        default="auto",
         help=(
             "flight model: auto (default) uses the compiled model if its results are bit-identical to JSBSim's, "
             "jsbsim always uses JSBSim"
@@ -262,14 +261,12 @@ def add_flight_options(parser: CommandParser) -> None:
         "--max-hours",
         metavar="H",
         type=number_parser("max_hours"),
-        default=6.0,
         help="stop after this many simulated hours (default: 6)",
     )
     limits.add_argument(
         "--max-log",
         metavar="MB",
         type=number_parser("max_log"),
-        default=256.0,
         help="stop when the log reaches this size, MB (default: 256; it grows by about 20 MB per hour)",
     )
 
@@ -293,7 +290,6 @@ def add_log_rate_option(group: OptionGroup) -> None:
         metavar="HZ",
         type=int,
         choices=CHOICES["log_hz"],
-        default=60,
         help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict is computed from these rows",
     )
 
