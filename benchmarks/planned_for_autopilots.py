@@ -16,7 +16,7 @@ from planfly.arguments import CHOICES
 from planfly.flight_options import flight_entries
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from planfly.workflow.uav import load_uav
 from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
 from world.scenario import with_flight
@@ -53,7 +53,7 @@ def fly(number: int, autopilot: str, sitl: Path | None) -> Flown:
     longer = float(plan.objectives[0] / make_plan(scenario, exact, number + 1).objectives[0])
     mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
     setup = make_setup(scenario, uav, mission, number + 1, plan=plan)
-    judged = fly_and_judge(setup, autopilot=sitl)
+    judged = fly_and_judge(setup, FlightTask(autopilot=sitl))
     harm = harm_of(scenario, plan.waypoints, judged.track)
     parts = [harm.text(scenario), "" if judged.ended == "completed" else judged.ended]
     parts += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]

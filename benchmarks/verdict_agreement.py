@@ -22,7 +22,7 @@ from logs.verdict.verdict import Verdict
 from planfly.arguments import CHOICES
 from planfly.flight_options import flight_entries
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from planfly.workflow.uav import Uav, load_uav
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
@@ -66,7 +66,7 @@ def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
     A violation of the clearance or of a sphere is grave if it exceeds `GRAVE`.
     """
     setup, _ = setup_of(made)
-    flown = fly_and_judge(setup, autopilot=program)
+    flown = fly_and_judge(setup, FlightTask(autopilot=program))
     threats, position = made.scenario.threats, flown.track.position
     away = np.sqrt(((position[:, None] - threats.position[None]) ** 2).sum(axis=2)) - threats.kill_radius
     least = made.scenario.limits.min_clearance_m - GRAVE

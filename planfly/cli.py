@@ -2,9 +2,9 @@
 
 The list of commands determines the parser, the help and the dispatch.  A command is two functions of a module of
 `planfly.commands`: ``add_NAME_parser`` adds its parser to the parser of the command line, and ``NAME`` takes the parsed
-arguments, calls the API with the given options (`planfly.terminal.options.given_options`), writes the results to
-standard output and the progress to standard error, and returns the exit code.  The API compiles the kernels that it
-needs.  All these modules are light: the code that a command needs is imported when the command runs.
+arguments, calls the API with the given options (``args.options``), writes the results to standard output and the
+progress to standard error, and returns the exit code.  The API compiles the kernels that it needs.  All these modules
+are light: the code that a command needs is imported when the command runs.
 """
 
 import argparse

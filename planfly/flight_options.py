@@ -438,7 +438,8 @@ def apply_options(
         new_scenario = with_flight(new_scenario, **entries)
     if forecast is not None:
         new_scenario = with_forecast(new_scenario, str(forecast))
-    new_scenario = with_file_autopilot(new_scenario, mission)
+    if new_scenario.flight.params is not None or (mission is not None and mission.autopilot):
+        new_scenario = with_file_autopilot(new_scenario, mission)
     if wind is not None or options.get("turbulence") is not None:
         new_scenario = with_wind(new_scenario, speed, from_course, options.get("turbulence"))
     table = new_scenario.spec.wind

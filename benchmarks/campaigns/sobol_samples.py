@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import QUANTITIES, Dispersions, Draw
 from planfly.campaigns.flight_row import FlightRow
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 
 # Flights of a set: a power of two, for which Sobol's points are balanced.
 SOBOL_FLIGHTS = 1024
@@ -42,5 +42,5 @@ def fly_sobol(base: CampaignBase, index: int, wind: GivenWind | None = None) -> 
     """Fly one Sobol sample by its index; wind: mean wind instead of the scenario's wind."""
     draw = sobol_draw(base.dispersions, base.seed, index)
     varied = vary_flight(base, draw, wind)
-    flown = fly_and_judge(varied.setup, off_nominal=varied.off_nominal, reference="never")
+    flown = fly_and_judge(varied.setup, FlightTask(off_nominal=varied.off_nominal, reference="never"))
     return FlightRow(draw, "flyable" if flown.verdict.flyable else "not flyable", flown.ended)

@@ -159,21 +159,27 @@ def parse_mission(text: str, source: str) -> Mission:
     first_text = text.removeprefix("\ufeff").lstrip()
     if first_text[:1] in ("{", "[") or (source.lower().endswith(".plan") and not first_text.startswith("QGC")):
         return parse_plan_file(text, source)
-    line_break_count = max(text.count("\n"), text.count("\r"))
-    if line_break_count > MAX_LINES:
-        raise MissionError(f"{source}: too long: {line_break_count:,} lines; the limit is {MAX_LINES:,}", file=source)
-    lines = [
-        (number, line.strip())
-        for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    _check_lines(lines, source)
-    locations = [TextLine(source, number) for number, _ in lines[1:]]
-    read_items = [_read_item(location, line) for location, (_, line) in zip(locations, lines[1:], strict=True)]
-    items = [item for item, _ in read_items]
+    locations, items, has_current = list[TextLine](), list[MissionItem](), False
+    for number, line in _item_lines(text, source):
+        location, texts = TextLine(source, number), line.split()
+        if len(texts) != len(_COLUMNS):
+            expected = f"expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})"
+            raise MissionError(f"{location}: {count_text(len(texts), 'column')}: {expected}", file=source)
+        numbers = [_read_number(location, name, text) for name, text in zip(_COLUMNS, texts, strict=True)]
+        seq, current, frame, command, p1, p2, p3, p4, lat, lon, alt, autocontinue = numbers
+        # A home line of Mission Planner may carry command 0.
+        command = command or (Command.NAV_WAYPOINT if seq == 0 else 0)
+        if is_located(int(command), int(frame)) and position_problem(lat, lon) is None:
+            lat, lon = round_to_grid(lat), round_to_grid(lon)
+        params = (p1, p2, p3, p4)
+        item = MissionItem(int(seq), int(command), int(frame), params, lat, lon, alt, bool(autocontinue))
+        if (problem := item_problem(item)) is not None:
+            raise MissionError(**problem.error_arguments(source, location))
+        locations.append(location)
+        items.append(item)
+        has_current |= bool(current)
     if not items:
         raise MissionError(f"{source}: no items after the header", file=source)
-    has_current = any(is_current for _, is_current in read_items)
     warnings = _collect_warnings(locations, items, has_current=has_current)
     # Fence and rally items without a home line are numbered from 0, too.
     first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
@@ -191,11 +197,19 @@ def parse_mission(text: str, source: str) -> Mission:
     )
 
 
-def _check_lines(lines: list[tuple[int, str]], source: str) -> None:
-    """Raise MissionError for a WPL 110 text that is empty, without the header, or with too many items.
+def _item_lines(text: str, source: str) -> list[tuple[int, str]]:
+    """Return the number and the text of each line with an item in a WPL 110 text, without comments.
 
-    lines: number and content of each line that is neither empty nor a comment.
+    Raises MissionError for a text that is empty or too long, without the header, or with too many items.
     """
+    line_break_count = max(text.count("\n"), text.count("\r"))
+    if line_break_count > MAX_LINES:
+        raise MissionError(f"{source}: too long: {line_break_count:,} lines; the limit is {MAX_LINES:,}", file=source)
+    lines = [
+        (number, line.strip())
+        for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
     if not lines:
         raise MissionError(
             f"{source}: empty; expected a first line '{HEADER}' and lines of {len(_COLUMNS)} columns",
@@ -212,46 +226,24 @@ def _check_lines(lines: list[tuple[int, str]], source: str) -> None:
         )
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{source}: too long: {len(lines) - 1:,} items; the limit is {MAX_ITEMS:,}", file=source)
+    return lines[1:]
 
 
-def _read_item(location: TextLine, line: str) -> tuple[MissionItem, bool]:
-    """Return the item in a line of a WPL 110 text, and True if the line is marked as current.
-
-    location: the line in messages.
-
-    Raises MissionError for the first column with an invalid value, and for an item that no autopilot accepts.
-    """
-    texts = line.split()
-    if len(texts) != len(_COLUMNS):
-        raise MissionError(
-            f"{location}: {count_text(len(texts), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
-            file=location.file,
-        )
-    values = []
-    for (name, allowed_range), text in zip(_COLUMNS.items(), texts, strict=True):
-        if allowed_range is None:
-            is_valid = _NUMBER.fullmatch(text) and math.isfinite(float(text))
-            allowed = f"expected a finite number{' (a decimal comma?)' if ',' in text else ''}"
-        else:
-            min_value, max_value = allowed_range
-            is_valid = _WHOLE_NUMBER.fullmatch(text) and min_value <= int(text) <= max_value
-            allowed = f"expected a whole number {min_value}..{max_value}"
-        if not is_valid:
-            message = f"{location}: {name} {_short_repr(text)}: {allowed}"
-            raise MissionError(message, file=location.file, field=name, value=text, allowed=allowed)
-        # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
-        values.append(float(text) + 0.0)
-    seq, current, frame, command, p1, p2, p3, p4, lat, lon, alt, autocontinue = values
-    # A home line of Mission Planner may carry command 0.
-    command = command or (Command.NAV_WAYPOINT if seq == 0 else 0)
-    if is_located(int(command), int(frame)) and position_problem(lat, lon) is None:
-        lat, lon = round_to_grid(lat), round_to_grid(lon)
-    params = (p1, p2, p3, p4)
-    item = MissionItem(int(seq), int(command), int(frame), params, lat, lon, alt, bool(autocontinue))
-    problem = item_problem(item)
-    if problem is not None:
-        raise MissionError(**problem.error_arguments(location.file, location))
-    return item, bool(current)
+def _read_number(location: TextLine, name: str, text: str) -> float:
+    """Return the number in a column of a line; raise MissionError if the column does not allow it."""
+    allowed_range = _COLUMNS[name]
+    if allowed_range is None:
+        is_valid = _NUMBER.fullmatch(text) and math.isfinite(float(text))
+        allowed = f"expected a finite number{' (a decimal comma?)' if ',' in text else ''}"
+    else:
+        min_value, max_value = allowed_range
+        is_valid = _WHOLE_NUMBER.fullmatch(text) and min_value <= int(text) <= max_value
+        allowed = f"expected a whole number {min_value}..{max_value}"
+    if not is_valid:
+        message = f"{location}: {name} {_short_repr(text)}: {allowed}"
+        raise MissionError(message, file=location.file, field=name, value=text, allowed=allowed)
+    # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
+    return float(text) + 0.0
 
 
 def _begins_with_home(items: list[MissionItem]) -> bool:

@@ -17,7 +17,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import flown_phases, leg_ends
 from logs.verdict.places import Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
-from logs.verdict.rules.registry import blocking_item_findings, run_rules, with_passing_suggestions
+from logs.verdict.rules.registry import run_rules, with_passing_suggestions
 from logs.verdict.summary import failed_at_take_off, headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
@@ -73,7 +73,6 @@ def judge_flight(
     if whole_requirements.envelope:
         # The answer by geometry alone, without the flight.
         route_findings = run_rules(whole_requirements, None, geometric=True, flight_findings=findings)
-        route_findings = (*blocking_item_findings(setup), *route_findings)
         has_failed, is_open = _has_failed(route_findings), bool(undecided_findings(route_findings))
         passes = not has_failed and not is_open
         disagreements = _disagreements("geometry", route_findings, findings)

@@ -12,7 +12,8 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer
-from logs.verdict.rules.registry import mission_findings, run_rules
+from logs.verdict.rules.mission_rule import mission_findings
+from logs.verdict.rules.registry import run_rules
 from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from planner.plan import Plan, Violation

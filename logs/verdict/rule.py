@@ -28,8 +28,6 @@ class Judge(Protocol):
         """Return the rule's findings, in the order of the route."""
 
 
-# Function that judges only a mission's items, for any autopilot.
-ItemsJudge = Callable[[FlightSetup], list[Finding]]
 # Function that judges the end of a flight.  Its last two arguments are the reason for the end, and True if the log is
 # complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
@@ -72,7 +70,7 @@ class Rule:
     Judging functions, each None if the rule has none:
     judge: judges the planned path, the flown track, and each part of an imported flight that followed the mission, as
         far as the log contains the data that ``log`` names.
-    judge_items, judge_end, judge_imported_end, merge, suggest: see their types.
+    judge_end, judge_imported_end, merge, suggest: see their types.
 
     log: data that the rule needs from an imported log.
     judges_whole_flight: True if the rule judges the flight as a whole, not a leg, a corner, a threat or a zone.
@@ -83,7 +81,6 @@ class Rule:
     name: str
     tolerances: tuple[str, ...] = ()
     judge: Judge | None = None
-    judge_items: ItemsJudge | None = None
     judge_end: EndJudge | None = None
     judge_imported_end: ImportedEndJudge | None = None
     merge: Merge | None = None

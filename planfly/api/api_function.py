@@ -49,6 +49,7 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
                 for name, default in defaults.items()
             ]
             signature = signature.replace(parameters=parameters)
+        ranged_options = [name for name in RANGED_OPTIONS if name in defaults]
 
         @functools.wraps(function)
         def checked_function(*args: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
@@ -58,11 +59,12 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
                     hint = did_you_mean(name, signature.parameters)
                     raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
             checked_args, checked_keywords = check_types(signature, args, keywords)
-            all_keywords = {**defaults, **checked_keywords}
-            check_arguments(**{name: all_keywords[name] for name in RANGED_OPTIONS if name in defaults})
+            # Defaults need no check.
+            if given := {name: checked_keywords[name] for name in ranged_options if name in checked_keywords}:
+                check_arguments(**given)
             compile_kernels = functools.partial(compile_and_report, kernel_units)
             with notify_before_compiling(compile_kernels, once=True):
-                return function(*checked_args, **all_keywords)
+                return function(*checked_args, **{**defaults, **checked_keywords})
 
         checked_function.__signature__ = signature  # type: ignore[attr-defined]
         return checked_function

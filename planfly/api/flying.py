@@ -41,6 +41,7 @@ from planfly.workflow.output_paths import (
 )
 from planfly.workflow.pipeline import (
     FlightLimits,
+    FlightTask,
     FlownMission,
     PlanThenFly,
     ReturnSummary,
@@ -182,8 +183,7 @@ def fly(
             prepare_folder(target.parent, LOG_FIGURES)
         report_replaced(target, *program_logs)
     with flying_stage(setup) as advance:
-        return fly_and_judge(
-            setup,
+        task = FlightTask(
             target,
             advance,
             every=60 // options["log_hz"],
@@ -192,6 +192,7 @@ def fly(
             reference="always" if options["levels"] else "failed",
             returns=target is not None,
         )
+        return fly_and_judge(setup, task)
 
 
 @api_function(*FLYING)

@@ -50,7 +50,7 @@ from planfly.rtl.sitl_returns import (
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
-from planfly.workflow.pipeline import FlownMission, fly_and_judge
+from planfly.workflow.pipeline import FlightTask, FlownMission, fly_and_judge
 from planner.plan import Plan
 from world.files import write_atomically
 from world.scenario import with_terrain
@@ -270,7 +270,7 @@ def returns(
     if request.program is not None:
         check_returns_as_arduplane(world, request.program)
     with stage("flying the mission"):
-        flight = fly_and_judge(setup, reference="never")
+        flight = fly_and_judge(setup, FlightTask(reference="never"))
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 

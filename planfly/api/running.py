@@ -32,6 +32,7 @@ from planfly.workflow.output_paths import (
 )
 from planfly.workflow.pipeline import (
     FlightLimits,
+    FlightTask,
     ReturnSummary,
     autopilot_log_path,
     fly_and_judge,
@@ -284,8 +285,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = make_setup(task.scenario, uav, mission, task.seed, plan=plan, engine=task.engine)
     with flying_stage(setup) as advance:
-        flight = fly_and_judge(
-            setup,
+        flight_task = FlightTask(
             folder / "flight.mcap",
             advance,
             every=task.every,
@@ -294,6 +294,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
             returns=True,
             limits=task.limits,
         )
+        flight = fly_and_judge(setup, flight_task)
     write_atomically(folder / "verdict.json", verdict_json(flight.verdict))
     summary = flight.returns or return_summary(flight.setup, flight.track)
     with stage("drawing", "drawing a report"):

@@ -54,7 +54,7 @@ from planfly.surveys.survey_text import (
 )
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
-from planfly.workflow.pipeline import FlownMission, fly_and_judge, flying_stage
+from planfly.workflow.pipeline import FlightTask, FlownMission, fly_and_judge, flying_stage
 from planfly.workflow.uav import uav_of_setup
 from world.errors import ArgumentError, LogError, MissionError, ParameterError
 from world.files import read_small_file, utf8_text, write_atomically
@@ -232,7 +232,7 @@ def survey(
     setup = _with_camera(planned_setup.in_scenario(_with_parallel_lines_as_survey(planned_setup.scenario)), user_camera)
     _check_has_survey(setup)
     with flying_stage(setup, "flying a survey") as advance:
-        flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
+        flight = fly_and_judge(setup, FlightTask(advance=advance, reference="never"))
     result = _measure_survey(route_requirements(flight.setup), flight.track, flight.verdict)
     if suggest and not result.usable and not result.unknown_lines:
         with stage("looking for what would help") as advance:

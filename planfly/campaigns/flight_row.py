@@ -25,7 +25,7 @@ from logs.verdict.summary import unjudged_parts
 from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import Draw, draw_flight
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from world.arrays import Singles
 from world.scenario import Scenario
 
@@ -281,13 +281,8 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     start_time = time.perf_counter()
     draw = draw_flight(base.dispersions, base.seed, index)
     varied_flight = vary_flight(base, draw, wind)
-    flight = fly_and_judge(
-        varied_flight.setup,
-        log,
-        off_nominal=varied_flight.off_nominal,
-        reference="never",
-        findings_only=log is None,
-    )
+    task = FlightTask(log, off_nominal=varied_flight.off_nominal, reference="never", findings_only=log is None)
+    flight = fly_and_judge(varied_flight.setup, task)
     track, route, verdict = flight.track, varied_flight.setup.route, flight.verdict
     has_rows, failed = len(track) > 0, list_failed_findings(verdict)
     unjudged = find_unjudged_rules(verdict, varied_flight.setup)

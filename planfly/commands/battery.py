@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from planfly.commands.campaigns import add_flights_options
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, NOT_FLYABLE, LineParser, colour_text
-from planfly.terminal.options import add_result_options, given_options
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def battery(args: argparse.Namespace) -> int:
     from planfly.api import campaigns
     from planfly.campaigns.battery_text import answer_line, battery_lines
 
-    result = campaigns.battery(**given_options(args))
+    result = campaigns.battery(**args.options)
     ok = result.is_enough
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"battery   {colour_text(answer_line(result), 'warning' if ok is None else 'good' if ok else 'bad')}")

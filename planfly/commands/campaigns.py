@@ -227,7 +227,7 @@ def winds(args: argparse.Namespace) -> int:
 
     folder = _result_folder(args, "winds")
     with _report_stored_flights(args, folder, "winds.sqlite") as interruption_code:
-        result = campaigns.winds(**given_options(args, out=folder))
+        result = campaigns.winds(**args.options | {"out": folder})
     if interruption_code():
         return interruption_code()
     from planfly.campaigns.report import wind_lines, winds_suite

@@ -11,7 +11,6 @@ from planfly.terminal.options import (
     add_log_rate_option,
     add_result_options,
     add_world_options,
-    given_options,
 )
 from planfly.terminal.output import print_warnings, write_json_if_requested, write_junit_if_requested
 from planfly.workflow.output_paths import FLY_LOG
@@ -53,7 +52,7 @@ def fly(args: argparse.Namespace) -> int:
 
     is_log_named = args.log is not None
     log = args.log if is_log_named else FLY_LOG
-    flight = flying.fly(**given_options(args, log=log, overwrite=args.overwrite or not is_log_named))
+    flight = flying.fly(**args.options | {"log": log, "overwrite": args.overwrite or not is_log_named})
     print_warnings(flight.setup.scenario.notes)
     print(*verdict_lines(flight.verdict, flight.setup.notes, flight.setup, flight.return_summary), sep="\n")
     if flight.log is None:

@@ -7,7 +7,7 @@ from planfly.arguments import CHOICES
 from planfly.commands.campaigns import add_flights_options
 from planfly.terminal.arguments import file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser, colour_text
-from planfly.terminal.options import add_result_options, given_options
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def ground_risk(args: argparse.Namespace) -> int:
     from planfly.api import ground_risk as ground_risk_api
     from planfly.campaigns.ground_risk_text import answer_line, risk_lines
 
-    result = ground_risk_api.ground_risk(**given_options(args))
+    result = ground_risk_api.ground_risk(**args.options)
     code = FLYABLE if result.is_judged else INCOMPLETE
     print(f"risk      {colour_text(answer_line(result), 'good' if result.is_judged else 'warning')}")
     for text in (*flown_condition_lines(result.base.conditions()), *risk_lines(result)):

@@ -139,7 +139,8 @@ def refly(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")
-    result = imported.refly(**given_options(args, log=log, out=folder, overwrite=args.overwrite or args.out is None))
+    overwrite = args.overwrite or args.out is None
+    result = imported.refly(**args.options | {"log": log, "out": folder, "overwrite": overwrite})
     print("\n".join(result.lines))
     for file in result.files:
         print(f"refly     {file}")

@@ -13,7 +13,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    given_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -77,7 +76,7 @@ def link(args: argparse.Namespace) -> int:
     from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import linking
 
-    result = linking.link(**given_options(args))
+    result = linking.link(**args.options)
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")

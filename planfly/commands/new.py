@@ -6,7 +6,7 @@ import shlex
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import complete_aircraft, number_parser, parse_position, with_completer
 from planfly.terminal.command_parser import FLYABLE, NOT_FLYABLE, LineParser, colour_text
-from planfly.terminal.options import add_result_options, add_terrain_option, given_options
+from planfly.terminal.options import add_result_options, add_terrain_option
 from planfly.terminal.output import write_json_if_requested
 
 
@@ -62,7 +62,7 @@ def new(args: argparse.Namespace) -> int:
     """
     from planfly.api import drafting, planning
 
-    file = drafting.new_scenario(**given_options(args))
+    file = drafting.new_scenario(**args.options)
     print(f"scenario  {file}")
     if args.terrain is None:
         print("ground    flat, at mean sea level: no elevation file was named (--terrain DEM)")

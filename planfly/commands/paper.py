@@ -7,7 +7,7 @@ from pathlib import Path
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import number_parser, parse_problems
 from planfly.terminal.command_parser import FLYABLE, LineParser
-from planfly.terminal.options import add_result_options, given_options
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 
@@ -53,7 +53,7 @@ def paper(args: argparse.Namespace) -> int:
     from planfly.planning.paper import paper_tables
 
     folder = Path(args.out) if args.out else RESULTS / "paper"
-    tables = paper_tables(**given_options(args, out=folder, overwrite=args.overwrite or args.out is None))
+    tables = paper_tables(**args.options | {"out": folder, "overwrite": args.overwrite or args.out is None})
     from planfly.planning.paper import table_text
 
     print(table_text(tables.rows))

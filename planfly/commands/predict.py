@@ -12,7 +12,6 @@ from planfly.terminal.options import (
     add_imported_log_options,
     add_result_options,
     add_world_options,
-    given_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -60,7 +59,7 @@ def predict(args: argparse.Namespace) -> int:
     """Predict a log, and print how much of the flight is inside each band."""
     from planfly.api import predicting
 
-    result = predicting.predict(**given_options(args))
+    result = predicting.predict(**args.options)
     print("\n".join(result.lines))
     for file in result.files:
         print(f"predicted {file}")

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, LineParser
-from planfly.terminal.options import add_log_argument, add_result_options, given_options
+from planfly.terminal.options import add_log_argument, add_result_options
 from planfly.terminal.output import warn_about_incomplete_log, write_json_if_requested
 from world.wording import count_text
 
@@ -26,7 +26,7 @@ def recover(args: argparse.Namespace) -> int:
 
     source = Path(args.log)
     target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
-    log = imported.recover(**given_options(args, out=target))
+    log = imported.recover(**args.options | {"out": target})
     if log is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
         write_json_if_requested(args, lambda: _json_answer(target=None, rows=None, end_time=None))

@@ -16,7 +16,6 @@ from planfly.terminal.options import (
     add_sitl_option,
     add_steering_options,
     add_world_options,
-    given_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -84,7 +83,7 @@ def returns(args: argparse.Namespace) -> int:
     from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import returning
 
-    result = returning.returns(**given_options(args))
+    result = returning.returns(**args.options)
     code = FLYABLE if result.safe else INCOMPLETE if result.undecided else NOT_FLYABLE
     print(
         f"returns   {colour_text(result.headline, 'good' if result.safe else 'warning' if result.undecided else 'bad')}"

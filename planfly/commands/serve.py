@@ -9,7 +9,6 @@ from planfly.terminal.options import (
     add_steering_options,
     add_vehicle_link_options,
     add_world_options,
-    given_options,
     print_and_flush,
     watch_stop_signals,
 )
@@ -61,5 +60,5 @@ def serve(args: argparse.Namespace) -> int:
     from planfly.api import serving
 
     with watch_stop_signals() as should_stop:
-        serving.serve(**given_options(args, stop=should_stop, on_message=print_and_flush))
+        serving.serve(**args.options | {"stop": should_stop, "on_message": print_and_flush})
     return FLYABLE

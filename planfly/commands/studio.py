@@ -14,7 +14,6 @@ from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
     add_world_options,
-    given_options,
     print_and_flush,
     watch_stop_signals,
 )
@@ -84,5 +83,5 @@ def studio(args: argparse.Namespace) -> int:
     from planfly.studio.open_studio import open_studio
 
     with watch_stop_signals() as should_stop:
-        open_studio(**given_options(args, stop=should_stop, on_message=print_and_flush))
+        open_studio(**args.options | {"stop": should_stop, "on_message": print_and_flush})
     return FLYABLE

@@ -12,7 +12,6 @@ from planfly.terminal.options import (
     add_result_options,
     add_steering_options,
     add_world_options,
-    given_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -68,7 +67,7 @@ def survey(args: argparse.Namespace) -> int:
     from logs.verdict.conditions import flown_condition_lines, judging_conditions
     from planfly.api import surveying
 
-    result = surveying.survey(**given_options(args))
+    result = surveying.survey(**args.options)
     code = verdict_code(result.verdict)
     if result.lost:
         code = NOT_FLYABLE

@@ -5,7 +5,7 @@ import shlex
 
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_area, with_completer
 from planfly.terminal.command_parser import FLYABLE, LineParser
-from planfly.terminal.options import add_result_options, given_options
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import print_warnings, write_json_if_requested
 
 # Maximum number of degree cells without data that are listed.
@@ -62,7 +62,7 @@ def terrain(args: argparse.Namespace) -> int:
     """Write the terrain of an area, and warn about missing tiles and pixels without data; return the exit code 0."""
     from planfly.api import cutting_terrain
 
-    result = cutting_terrain.terrain(**given_options(args, out=args.out or "dem.tif"))
+    result = cutting_terrain.terrain(**args.options | {"out": args.out or "dem.tif"})
     rows, cols = result.shape
     tiles = result.tiles[0] if len(result.tiles) == 1 else f"{len(result.tiles)} tiles"
     print(f"terrain   {result.file}: {rows:,} x {cols:,} pixels from {tiles}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from planfly.commands.campaigns import add_flights_options
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import FLYABLE, INCOMPLETE, NOT_FLYABLE, LineParser, colour_text
-from planfly.terminal.options import add_result_options, given_options
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def window(args: argparse.Namespace) -> int:
     from planfly.api import finding_windows
     from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
 
-    result = finding_windows.window(**given_options(args))
+    result = finding_windows.window(**args.options)
     go = result.is_go
     code = INCOMPLETE if go is None else FLYABLE if go else NOT_FLYABLE
     print(f"window    {colour_text(answer_line(result), 'warning' if go is None else 'good' if go else 'bad')}")

@@ -37,7 +37,7 @@ from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import measured_text
 from planfly.rtl.jsbsim_returns import LEAD_IN_LENGTH_M, find_nearest_approaches, positions_from_start, return_setup
 from planfly.runtime.stages import stage
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from world.arrays import Floats
 from world.errors import ArgumentError, MissionError
 from world.kernels import Record
@@ -231,7 +231,7 @@ def fly_with_autopilot(
             except MissionError as error:
                 program_returns.append(ProgramReturn(simulated_return, reason=str(error)))
                 continue
-            flight = fly_and_judge(setup, log, advance, autopilot=program, reference="never")
+            flight = fly_and_judge(setup, FlightTask(log, advance, autopilot=program, reference="never"))
         version = flight.setup.autopilot.version
         program_return = _judge_flown_return(
             world, simulated_return, starts.rows[start_index], flight.track, flight.ended

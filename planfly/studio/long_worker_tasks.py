@@ -19,7 +19,7 @@ from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.worker_pool import Workers
 from planfly.studio.edit_context import EditContext
 from planfly.studio.worker_process import Advance
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from world.errors import MissionError
 from world.extras import require_extra
 
@@ -56,9 +56,8 @@ def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
         reason = f"returns cannot be judged without {missing_input}"
         raise MissionError(f"{mission.source}: {reason}", field=missing_input)
     world = make_return_world(setup)
-    flight = fly_and_judge(
-        setup, log=None, advance=lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
-    )
+    task = FlightTask(advance=lambda done, total, remark: advance(0.5 * done, total, remark), reference="never")
+    flight = fly_and_judge(setup, task)
     interval = max(1.0, (float(flight.track.time[-1]) if len(flight.track) else 0.0) / _MAX_RETURNS)
     starts = return_starts(setup, flight.track, interval)
     remark = f"flying {len(starts)} returns"

@@ -24,7 +24,7 @@ from planfly.studio.view_model import can_apply_in_studio, findings_json, round_
 from planfly.studio.worker_process import Advance
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.mission_context import JudgedMission
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, finding_key, tried_suggestions
 from planfly.workflow.uav import Uav
 from planner.evaluation.certify import least_height
@@ -52,7 +52,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     """
     context, mission = payload
     setup = context.setup(mission)
-    flight = fly_and_judge(setup, log=None, advance=advance, reference="never")
+    flight = fly_and_judge(setup, FlightTask(advance=advance, reference="never"))
     requirements = route_requirements(setup)
     judged_mission = JudgedMission(mission, setup, requirements, flight.verdict)
     states = place_states(requirements, flight.verdict.findings)

@@ -102,6 +102,8 @@ def colour_help(text: str) -> str:
     return text
 
 
+# Options that only the terminal has; all others are keywords of the API.
+_TERMINAL_OPTIONS = ("command", "json", "junit", "quiet")
 # Comma-separated numbers that start with a negative number, which argparse would take for an option.
 _NEGATIVE_NUMBERS = re.compile(r"-\.?\d[^=]*")
 # Long option as one word.
@@ -240,7 +242,11 @@ class LineParser(CommandParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """Parse the command line. For bad usage, print one line with a suggestion and raise SystemExit."""
+        """Parse the command line. For bad usage, print one line with a suggestion and raise SystemExit.
+
+        The attribute ``options`` of the result has the given options of the command as keywords of the API. An option
+        that was not given (None) is left out, so that its keyword keeps the default.
+        """
         arguments: list[str] = []
         for argument in sys.argv[1:] if args is None else args:
             # A negative number is joined to the option before it, as in --from=-33.9,18.4.
@@ -269,6 +275,8 @@ class LineParser(CommandParser):
             word = next((argument for argument in unknown_arguments if argument != "--"), unknown_arguments[0])
             is_file = Path(word).exists()
             parser.error(f"{word}: {'the command takes one file at a time' if is_file else 'no such argument'}")
+        given_options = {name: value for name, value in vars(parsed).items() if value is not None}
+        parsed.options = {name: value for name, value in given_options.items() if name not in _TERMINAL_OPTIONS}
         return parsed
 
 

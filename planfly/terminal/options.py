@@ -1,6 +1,6 @@
 """Add options that several commands share.
 
-The dest of an option is the matching keyword of the API, so that `given_options` needs no table of names.
+The dest of an option is the matching keyword of the API, so that no table of names is needed.
 """
 
 import argparse
@@ -25,31 +25,20 @@ from planfly.terminal.command_parser import CommandParser, OptionGroup
 from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
 
-# Options that only the terminal has; all others are keywords of the API.
-_TERMINAL_OPTIONS = ("command", "json", "junit", "quiet")
 
+def given_options(args: argparse.Namespace, function: Callable[..., object], /, **overrides: Any) -> dict[str, Any]:
+    """Return the given options that are keywords of one function, for a command that calls several of the API.
 
-def given_options(
-    args: argparse.Namespace, function: Callable[..., object] | None = None, /, **overrides: Any
-) -> dict[str, Any]:
-    """Return the given options of a command as keywords of the API.
+    A command that calls one function passes `args.options`, see `planfly.terminal.command_parser.LineParser`.
 
-    An option that was not given (None) is left out, so that its keyword keeps the default.
+    overrides: keywords that override the options; None keeps the default of the function.
 
-    function: function of the API whose keywords are returned, for a command with options of several functions; None for
-        a command with one function.
-    overrides: keywords that override the options.
-
-    >>> given_options(argparse.Namespace(seed=3, out=None, json="-"), seed=4)
+    >>> given_options(argparse.Namespace(seed=3, width=80, out=None), lambda *, seed, out: seed, seed=4)
     {'seed': 4}
-    >>> given_options(argparse.Namespace(seed=3, width=80), lambda *, seed: seed)
-    {'seed': 3}
     """
-    options = {name: value for name, value in vars(args).items() if name not in _TERMINAL_OPTIONS}
-    if function is not None:
-        parameters = inspect.signature(function).parameters
-        options = {name: value for name, value in options.items() if name in parameters}
-    return {name: value for name, value in (options | overrides).items() if value is not None}
+    keywords = inspect.signature(function).parameters
+    options = {name: value for name, value in vars(args).items() if name in keywords} | overrides
+    return {name: value for name, value in options.items() if value is not None}
 
 
 # ----------------------------------------------------------------------
@@ -256,7 +245,6 @@ def add_flight_options(parser: CommandParser) -> None:
     group.add_argument(
         "--engine",
         choices=CHOICES["engine"],
-        default="auto",
         help=(
             "flight model: auto (default) uses the compiled model if its results are bit-identical to JSBSim's, "
             "jsbsim always uses JSBSim"
@@ -273,14 +261,12 @@ def add_flight_options(parser: CommandParser) -> None:
         "--max-hours",
         metavar="H",
         type=number_parser("max_hours"),
-        default=6.0,
         help="stop after this many simulated hours (default: 6)",
     )
     limits.add_argument(
         "--max-log",
         metavar="MB",
         type=number_parser("max_log"),
-        default=256.0,
         help="stop when the log reaches this size, MB (default: 256; it grows by about 20 MB per hour)",
     )
 
@@ -304,7 +290,6 @@ def add_log_rate_option(group: OptionGroup) -> None:
         metavar="HZ",
         type=int,
         choices=CHOICES["log_hz"],
-        default=60,
         help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict is computed from these rows",
     )
 

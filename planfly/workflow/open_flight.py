@@ -66,7 +66,8 @@ def open_flight(
     >>> setup.name, setup.mission.source, setup.scenario.wind.speed
     ('paper-07', 'plan.json', 4.0)
     """
-    fences = read_named_fences(options.get("fence") or ())
+    fence_files = options.get("fence")
+    fences = read_named_fences(fence_files) if fence_files else NamedFences()
     named_world = options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options.get("terrain"))
     if isinstance(plan_or_file, Plan) or Path(plan_or_file).suffix.lower() == ".json":
@@ -209,7 +210,8 @@ def make_setup(
             mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
-    route = with_end_courses(route, scenario, limits)
+    if scenario.start_course is not None or scenario.destination_course is not None:
+        route = with_end_courses(route, scenario, limits)
     if (forecast := scenario.wind.forecast) is not None:
         positions, file = route.positions, str(scenario.spec.wind.forecast)
         latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])

@@ -4,9 +4,8 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from aircraft.catalog import Aircraft, find_logged_aircraft
+from aircraft.catalog import find_logged_aircraft
 from flight.autopilots.catalog import find_program_class
-from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
@@ -20,7 +19,7 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
-from logs.verdict.returns.return_starts import ReturnStarts, return_starts
+from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import returns_headline
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
@@ -51,10 +50,6 @@ class FlightLimits:
 
     hours: float = MAX_HOURS
     megabytes: float = MAX_MEGABYTES
-
-
-# Limits of a flight unless others are given.
-_DEFAULT_LIMITS = FlightLimits()
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -95,6 +90,37 @@ class OffNominal:
 
     variation: Variation
     start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightTask:
+    """How `fly_and_judge` flies, records and judges a setup.
+
+    log: file for the flight log; None writes no log.
+    advance: called with the progress of the flight; None to report none.
+    every: one row out of this many is recorded and judged, so that a check of the log gives the same verdict.
+    autopilot: the program of ArduPlane or PX4 that flies instead of planfly's simulated autopilot; its own log is kept
+        next to the flight log.
+    off_nominal: differences between the flight and the assumptions of plan and guidance; ignored if a program flies.
+    reference: cases in which reference flights are flown, see `planfly.workflow.reference_flights.explain_verdict`.
+    returns: True judges returns from a few points, and draws them in the log.  Without a log no returns are judged.
+    findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
+    limits: limits of the flight time and of the size of the log.
+    """
+
+    log: Path | None = None
+    advance: Advance | None = None
+    every: int = 1
+    autopilot: Path | None = None
+    off_nominal: OffNominal = OffNominal(Variation())
+    reference: FlyReference = "failed"
+    returns: bool = False
+    findings_only: bool = False
+    limits: FlightLimits = FlightLimits()
+
+
+# Task of a flight that is neither recorded nor shown.
+_DEFAULT_TASK = FlightTask()
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +228,7 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     if not plan.feasible:
         return PlanThenFly(plan, mission, track=None, verdict=judge_plan_only(plan, planning_conditions(scenario, uav)))
     setup = make_setup(scenario, uav, mission, chosen_seed, plan=plan)
-    flight = fly_and_judge(setup, log)
+    flight = fly_and_judge(setup, FlightTask(log))
     return PlanThenFly(plan, mission, flight.track, flight.verdict)
 
 
@@ -222,78 +248,91 @@ def flying_stage(setup: FlightSetup, kind: str = "") -> AbstractContextManager[A
 
 
 def fly_and_judge(
-    setup: FlightSetup,
-    log: Path | None = None,
-    advance: Advance | None = None,
-    *,
-    every: int = 1,
-    autopilot: Path | None = None,
-    off_nominal: OffNominal | None = None,
-    reference: FlyReference = "failed",
-    returns: bool = False,
-    findings_only: bool = False,
-    limits: FlightLimits = _DEFAULT_LIMITS,
+    setup: FlightSetup, task: FlightTask = _DEFAULT_TASK, flight: RunningFlight | None = None
 ) -> FlownMission:
-    """Fly a setup, record the flight if a log is named, and judge it.
+    """Fly a setup to its end or to a limit, record the flight if the task names a log, and judge the recorded rows.
 
-    log: file for the flight log; None writes no log.
-    every: one row out of this many is recorded and judged, so that a check of the log gives the same verdict.
-    autopilot: the program of ArduPlane or PX4 that flies instead of planfly's simulated autopilot; its own log is kept
-    next to the flight log.
-    off_nominal: differences between the flight and the assumptions of plan and guidance; ignored if a program flies.
-    reference: cases in which reference flights are flown, see `planfly.workflow.reference_flights.explain_verdict`.
-    returns: True judges returns from a few points, and draws them in the log.  Without a log no returns are judged.
-    findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
-    limits: limits of the flight time and of the size of the log.
+    flight: the started flight of a program; None to start a flight as the task states.
+    If the task asks for it, the verdict is explained by reference flights, and the log also gets returns.  A flight
+    that cannot start, or that `check_energy` refuses, has no row and no log; its verdict covers the route.
 
-    If the flight cannot start, or `check_energy` refuses it, the result has no row and no log; its verdict covers the
-    route and says that the flight did not start.  Raises FlightError if the catalog does not contain the setup's
-    aircraft, or if a program does not fly the mission to its end; then no log is left.
+    Raises FlightError if the catalog does not contain the setup's aircraft, or if a program does not fly the mission to
+    its end; then no log is left.
     """
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
-    task = _FlightTask(aircraft, log, advance, every, limits, reference, returns=returns, findings_only=findings_only)
-    requirements = route_requirements(setup)
+    requirements, limits = route_requirements(setup), task.limits
     try:
-        check_energy(requirements)
-        if autopilot is not None:
-            return _fly_with_program(task, setup, find_program_class(autopilot).with_model(setup.autopilot, autopilot))
-        off_nominal_flight = off_nominal or OffNominal(Variation())
-        flight = Flight(setup, aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset)
-        return _record_and_judge(task, requirements, flight)
+        if flight is None:
+            check_energy(requirements)
+            if task.autopilot is not None:
+                return _fly_with_program(setup, task, task.autopilot)
+            flight = Flight(setup, aircraft, task.off_nominal.variation, start_offset=task.off_nominal.start_offset)
     except StartError as error:
-        end_reason, track = f"not started: {error.reason}", join_tracks([])
-        if log is not None:
-            # The log of an earlier flight.
-            log.unlink(missing_ok=True)
-        verdict = judge_flight(setup, track, end_reason, requirements=requirements)
-        if reference != "never":
-            verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
-        return FlownMission(setup, track, verdict, end_reason)
+        return _unstarted_flight(requirements, task, f"not started: {error.reason}")
+    flight.max_ticks = min(flight.max_ticks, round(3600.0 * limits.hours / flight.dt))
+    builder, end_reason, length = TrackBuilder(), "", flight.path.length
+    with ExitStack() as open_logs:
+        recorder = None
+        if task.log is not None:
+            recorder = open_logs.enter_context(Recorder(task.log, setup, every=task.every, batch=BATCH_S))
+        # A recorded flight is written second by second, so that a crash of the process loses no more.
+        block_ticks = round((LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S) / flight.dt)
+        while not end_reason:
+            rows, end_reason = flight.fly_block(block_ticks)
+            builder.add(rows)
+            if recorder is not None and len(rows):
+                recorder.write_rows(rows)
+                if not end_reason and recorder.size > 1e6 * limits.megabytes:
+                    size_text = f"{limits.megabytes:g} MB"
+                    end_reason = f"log limit: the log has reached {size_text}; --max-log raises the limit"
+            if task.advance is not None:
+                task.advance(flight.distance, length, f"{flight.distance / 1000:.1f} of {length / 1000:.1f} km")
+        track, reference, summary = builder.track(), None, None
+        if recorder is not None:
+            recorder.end_reason = end_reason
+            track = thin_track(track, task.every) if task.every > 1 else track
+        verdict = judge_flight(setup, track, end_reason, requirements=requirements, findings_only=task.findings_only)
+        is_requested = task.reference == "always"
+        if is_requested or (task.reference == "failed" and verdict.failed):
+            verdict, reference = explain_verdict(requirements, aircraft, verdict, is_requested=is_requested)
+        end_time = float(track.time[-1]) if len(track) else 0.0
+        events = (
+            LogEvent(0.0, f"flight model: {flight.engine}", "info"),
+            LogEvent(end_time, f"flight ended: {end_reason}", "info" if end_reason == "completed" else "error"),
+        )
+        if recorder is not None:
+            for event in events:
+                recorder.event(event.time, event.text, event.level)
+            summary = return_summary(setup, track) if task.returns else None
+            drawn_returns = None if summary is None else summary.data_for_pictures(glides=False)
+            recorder.finish(end_reason, verdict, reference, drawn_returns)
+    log, engine = (task.log, flight.engine) if len(track) else (None, "")
+    return FlownMission(
+        setup, track, verdict, end_reason, events, log, returns=summary, engine=engine, reference=reference
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class _FlightTask:
-    """Arguments of `fly_and_judge` for one flight, and the setup's aircraft."""
-
-    aircraft: Aircraft
-    log: Path | None
-    advance: Advance | None
-    every: int
-    limits: FlightLimits
-    reference: FlyReference
-    returns: bool
-    findings_only: bool
+def _unstarted_flight(requirements: RouteRequirements, task: FlightTask, end_reason: str) -> FlownMission:
+    """Remove the log of an earlier flight, and judge the route of a flight that did not start."""
+    setup, track = requirements.setup, join_tracks([])
+    if task.log is not None:
+        task.log.unlink(missing_ok=True)
+    verdict = judge_flight(setup, track, end_reason, requirements=requirements)
+    if task.reference != "never":
+        verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
+    return FlownMission(setup, track, verdict, end_reason)
 
 
-def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAutopilot) -> FlownMission:
+def _fly_with_program(setup: FlightSetup, task: FlightTask, program_file: Path) -> FlownMission:
     """Fly a setup with an autopilot program, keep the program's own log, and judge the flight.
 
     Raises FlightError, after removing the flight log, if the program does not fly the mission to its end.
     """
-    with program.start(setup, task.aircraft) as flight:
+    program = find_program_class(program_file).with_model(setup.autopilot, program_file)
+    with program.start(setup, find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)) as flight:
         flight.prepare()
         try:
-            judged_flight = _record_and_judge(task, route_requirements(flight.setup), flight)
+            judged_flight = fly_and_judge(flight.setup, task, flight)
         except FlightError:
             if task.log is not None:
                 task.log.unlink(missing_ok=True)
@@ -314,69 +353,6 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
     return log.with_suffix(find_program_class(program).log_suffix)
 
 
-def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: RunningFlight) -> FlownMission:
-    """Fly to the end or to a limit, record the flight if a log is named, and judge the recorded rows.
-
-    If the task asks for it, the verdict is explained by reference flights, and the log also gets returns.
-    """
-    limits = task.limits
-    flight.max_ticks = min(flight.max_ticks, round(3600.0 * limits.hours / flight.dt))
-    builder, end_reason, length = TrackBuilder(), "", flight.path.length
-    with ExitStack() as open_logs:
-        recorder = None
-        if task.log is not None:
-            recorder = Recorder(task.log, flight.setup, every=task.every, batch=BATCH_S)
-            open_logs.enter_context(recorder)
-        # A recorded flight is written second by second, so that a crash of the process loses no more.
-        block_ticks = round((LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S) / flight.dt)
-        while not end_reason:
-            rows, end_reason = flight.fly_block(block_ticks)
-            builder.add(rows)
-            if recorder is not None and len(rows):
-                recorder.write_rows(rows)
-                if not end_reason and recorder.size > 1e6 * limits.megabytes:
-                    size_text = f"{limits.megabytes:g} MB"
-                    end_reason = f"log limit: the log has reached {size_text}; --max-log raises the limit"
-            if task.advance is not None:
-                task.advance(flight.distance, length, f"{flight.distance / 1000:.1f} of {length / 1000:.1f} km")
-        track = builder.track()
-        if recorder is not None:
-            recorder.end_reason = end_reason
-            if task.every > 1:
-                track = thin_track(track, task.every)
-        reference_flights, summary = None, None
-        verdict = judge_flight(
-            requirements.setup, track, end_reason, requirements=requirements, findings_only=task.findings_only
-        )
-        is_requested = task.reference == "always"
-        if is_requested or (task.reference == "failed" and verdict.failed):
-            verdict, reference_flights = explain_verdict(
-                requirements, task.aircraft, verdict, is_requested=is_requested
-            )
-        end_time = float(track.time[-1]) if len(track) else 0.0
-        events = (
-            LogEvent(0.0, f"flight model: {flight.engine}", "info"),
-            LogEvent(end_time, f"flight ended: {end_reason}", "info" if end_reason == "completed" else "error"),
-        )
-        if recorder is not None:
-            for event in events:
-                recorder.event(event.time, event.text, event.level)
-            summary = return_summary(flight.setup, track) if task.returns else None
-            drawn_returns = None if summary is None else summary.data_for_pictures(glides=False)
-            recorder.finish(end_reason, verdict, reference_flights, drawn_returns)
-    return FlownMission(
-        requirements.setup,
-        track,
-        verdict,
-        end_reason,
-        events,
-        task.log if len(track) else None,
-        returns=summary,
-        engine=flight.engine if len(track) else "",
-        reference=reference_flights,
-    )
-
-
 def return_summary(
     setup: FlightSetup, track: Track | None, requirements: RouteRequirements | None = None
 ) -> ReturnSummary:
@@ -390,11 +366,13 @@ def return_summary(
         return ReturnSummary()
     try:
         world = make_return_world(setup)
-        duration = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
-            duration = float(track.time[-1] - track.time[0])
-        interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
-        starts = return_starts(setup, track, interval, requirements)
+            interval = max(1.0, float(track.time[-1] - track.time[0]) / _SUMMARY_RETURN_COUNT)
+            starts = flown_starts(setup, track, interval)
+        else:
+            duration = setup.path.length / max(1.0, setup.airspeed)
+            interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
+            starts = planned_starts(setup, interval, requirements)
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")

@@ -38,7 +38,7 @@ from flight.mission.items import (
 )
 from flight.mission.itinerary import make_itinerary
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
+from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message, undecided_findings
 from logs.verdict.measures.mission_ends import judges_return_after_last_item, missing_ends_text
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
@@ -137,6 +137,16 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         *_unreached_findings(setup),
         *_unsimulated_findings(setup),
     ]
+
+
+def blocking_findings(setup: FlightSetup) -> list[Finding]:
+    """Return the findings on mission items that fail or leave the verdict undecided.
+
+    The items of a plan are judged only if PX4 is to fly them, because planfly wrote them.
+    """
+    if setup.plan is not None and setup.autopilot.checks.dialect != "px4":
+        return []
+    return [finding for finding in mission_findings(setup) if finding.ok is False or undecided_findings([finding])]
 
 
 # Remark of a check: result, item (None for the whole mission), and reason.  The result "refused" fails if PX4 is to
@@ -560,5 +570,4 @@ RULE = Rule(
         *("NOMINAL_CELL_VOLTAGE_V", "FULL_CELL_VOLTAGE_V"),
         *("PX4_LANDING_BUFFER_RAD", "PX4_FIRST_WAYPOINT_DISTANCE_M", "PX4_WAYPOINT_SPACING_M", "PX4_GATE_SPACING_M"),
     ),
-    judge_items=mission_findings,
 )

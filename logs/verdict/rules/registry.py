@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flight.guidance.path import reversals
-from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import (
     GROUND_PATH,
     NOT_FLOWN,
@@ -15,7 +14,6 @@ from logs.verdict.findings import (
     Finding,
     make_finding,
     message,
-    undecided_findings,
     worst_first_key,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -87,21 +85,6 @@ RULES: dict[str, Rule] = {name: next(rule for rule in _RULES if rule.name == nam
 # The findings of each level, rule by rule in the order of `RULES`.
 
 
-def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return the findings of all rules that judge a mission's items, without its path."""
-    return [finding for rule in RULES.values() if rule.judge_items is not None for finding in rule.judge_items(setup)]
-
-
-def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
-    """Return the findings on mission items that fail or leave the verdict undecided.
-
-    The items of a plan are judged only if PX4 is to fly them, because planfly wrote them.
-    """
-    items_are_judged = setup.plan is None or setup.autopilot.checks.dialect == "px4"
-    findings = mission_findings(setup) if items_are_judged else []
-    return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
-
-
 def run_rules(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
@@ -115,7 +98,8 @@ def run_rules(
 ) -> tuple[Finding, ...]:
     """Judge a flown track or a route by all rules, and return the findings after all merges.
 
-    geometric: True to judge the route by its geometry; False to judge the flight and the mission's items.
+    geometric: True to judge the route by its geometry, False to judge the flight.  The mission's items are judged with
+        a flight, and by `logs.verdict.judge_geometry.judge_geometry`.
     end_reason: "completed", or the reason why the flight ended early; None if the end of the flight is not judged.
     log_complete: True if the log is not cut off.
     includes_whole_flight: True to include rules that judge the whole flight, and to keep only the worst findings of
@@ -143,7 +127,8 @@ def run_rules(
             merged = rule.merge(requirements, aligned, merged)
     if includes_whole_flight:
         merged = (*worst_finding_per_stop(merged), *_other_side_findings(requirements, merged))
-    merged = merged if geometric else (*blocking_item_findings(requirements.setup), *merged)
+    if not geometric or flight_findings is not None:
+        merged = (*mission_rule.blocking_findings(requirements.setup), *merged)
     if not suggests:
         return merged
     return_legs = {requirements.leg_place(i) for i in requirements.setup.route.rtl_legs}

@@ -3,12 +3,12 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import planfly
+from flight.simulation.setup import FlightSetup
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world, worst_first_key
 from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
@@ -16,6 +16,7 @@ from planfly.rtl import jsbsim_returns as return_flights
 from planfly.rtl import sitl_returns as program_returns
 from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, choose_worst_returns
 from planfly.workflow.open_flight import open_flight
+from planfly.workflow.pipeline import FlightTask, FlownMission
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
 from tests.logs.verdict.returns.valley import valley_mission
@@ -50,8 +51,8 @@ def test_a_return_that_a_program_flies_as_the_law_does_agrees(
     if not SOAK:
         fly = program_returns.fly_and_judge
 
-        def by_law(*given: Any, autopilot: Path, **how: Any) -> Any:
-            return fly(*given, **how)
+        def by_law(setup: FlightSetup, task: FlightTask) -> FlownMission:
+            return fly(setup, replace(task, autopilot=None))
 
         monkeypatch.setattr(program_returns, "fly_and_judge", by_law)
     flat = [word.replace("mound.toml", "flat.toml") for word in ASKED]
@@ -126,7 +127,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
 def test_a_program_may_fly_a_low_approach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The required height applies up to the first item of the landing sequence, as in the simulation."""
     fly = program_returns.fly_and_judge
-    monkeypatch.setattr(program_returns, "fly_and_judge", lambda *given, autopilot, **how: fly(*given, **how))
+    monkeypatch.setattr(program_returns, "fly_and_judge", lambda setup, task: fly(setup, replace(task, autopilot=None)))
     setup = open_flight(valley_mission(tmp_path), {"terrain": "jacksboro"})
     world, starts = make_return_world(setup).with_parameters(RTL_AUTOLAND=2), planned_starts(setup, 20.0)
     returns = judge_returns(world, starts.subset(np.array([1])), 20.0)

@@ -7,7 +7,7 @@ import pytest
 from flight.mission.from_plan import plan_mission
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from planfly.workflow.uav import load_uav
 from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
 from tests.autopilots import need_arduplane
@@ -27,7 +27,7 @@ def fly(number: int, autopilot: Path | None) -> None:
     mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
     setup = make_setup(scenario, uav, mission, number + 1, plan=plan)
     assert setup.nav == "gnss"
-    flown = fly_and_judge(setup, autopilot=autopilot)
+    flown = fly_and_judge(setup, FlightTask(autopilot=autopilot))
     assert flown.ended == "completed"
     harm = harm_of(scenario, plan.waypoints, flown.track)
     assert harm.text(scenario) == ""

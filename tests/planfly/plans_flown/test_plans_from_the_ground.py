@@ -15,7 +15,7 @@ from flight.mission.items import Command, Mission, MissionItem
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlightTask, fly_and_judge
 from planfly.workflow.uav import Uav, load_uav
 from tests.autopilots import need_arduplane
 from tests.ground_missions import draw_field
@@ -176,7 +176,7 @@ def test_fresh_plans_do_no_harm(launch: str, aircraft: str, wanted: int, whose: 
         planned += 1
         mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
         setup = make_setup(scenario, uav, mission, 1, plan=plan)
-        flown = fly_and_judge(setup, reference="never", autopilot=program)
+        flown = fly_and_judge(setup, FlightTask(reference="never", autopilot=program))
         harm, low = harm_of_flight(scenario, setup.route.positions[-1], flown.track.position)
         least = min(least, low)
         harmed += [f"{scenario.name}: {harm}"] if harm else []

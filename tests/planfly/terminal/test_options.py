@@ -150,5 +150,6 @@ def test_a_call_states_the_keywords_that_the_options_name() -> None:
     assert api(**given_options(args, api)) == ("a.plan", 3, "here", [])
     assert api(**given_options(args, api, seed=4, out="there")) == ("a.plan", 4, "there", [])
     assert api(**given_options(args, api, seed=None)) == ("a.plan", 1, "here", [])
-    del args.overwrite
-    assert api(**given_options(args)) == ("a.plan", 3, "here", [])
+    options = build_parser().parse_args(["fly", "a.plan", "--seed", "3", "--json", "-"]).options
+    assert (options["mission"], options["seed"], options["overwrite"]) == ("a.plan", 3, False)
+    assert not options.keys() & {"command", "json", "quiet", "wind", "options"}

@@ -78,7 +78,7 @@ def test_defaults_are_those_of_the_help() -> None:
     assert (serve.to, serve.bind, serve.speed) == ("127.0.0.1:14550", "127.0.0.1:14580", 1.0)
     paper = build_parser().parse_args(["paper"])
     assert (paper.problems, paper.runs, paper.algorithm) == ((7, 15, 30, 60), 15, "umda")
-    assert build_parser().parse_args(["fly", "m.plan"]).log_hz == 60
+    assert build_parser().parse_args(["fly", "m.plan", "--log-hz", "30"]).log_hz == 30
 
 
 @pytest.mark.parametrize("argv", [[], ["land"], ["fly"], ["fly", "m.plan", "--log-hz", "15"], ["paper", "--jobs", "0"]])

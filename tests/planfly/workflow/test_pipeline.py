@@ -9,7 +9,7 @@ import pytest
 from logs.recording.reader import read_log
 from logs.verdict.verdict import verdict_json
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge, plan_then_fly
+from planfly.workflow.pipeline import FlightTask, fly_and_judge, plan_then_fly
 from planfly.workflow.uav import load_uav
 from tests.setups import small_scenario, waypoint_mission
 
@@ -25,8 +25,8 @@ def test_a_thinned_log_holds_the_rows_that_were_judged(tmp_path: Path) -> None:
     assert setup.route.leg_airspeeds.tolist() == [25.0, 22.0]
     np.testing.assert_allclose(setup.route.positions, POINTS, atol=0.02)
     reports: list[tuple[float, float, str]] = []
-    whole = fly_and_judge(setup, None, lambda *report: reports.append(report))
-    thin = fly_and_judge(setup, tmp_path / "f.mcap", every=3)
+    whole = fly_and_judge(setup, FlightTask(advance=lambda *report: reports.append(report)))
+    thin = fly_and_judge(setup, FlightTask(tmp_path / "f.mcap", every=3))
     log = read_log(tmp_path / "f.mcap")
     assert log.complete
     assert log.ended == whole.ended == "completed"

@@ -27,7 +27,7 @@ from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
 from planfly.live.served_flights import ServedLog
 from planfly.workflow import reference_flights, suggestion_trials
-from planfly.workflow.pipeline import FlownMission, fly_and_judge
+from planfly.workflow.pipeline import FlightTask, FlownMission, fly_and_judge
 from planfly.workflow.reference_flights import (
     explain_verdict,
     find_deciding_parameter,
@@ -340,7 +340,7 @@ def over_a_hill(spare: float) -> FlightSetup:
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlownMission, Path]:
     setup, log = over_a_hill(4.7), tmp_path_factory.mktemp("hill") / "flight.mcap"
-    return fly_and_judge(setup, log), log
+    return fly_and_judge(setup, FlightTask(log)), log
 
 
 def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[FlownMission, Path]) -> None:
@@ -471,7 +471,7 @@ def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
     assert usual.reference is None
     assert usual.verdict.flyable
     assert [level.name for level in usual.verdict.levels] == ["geometry", "autopilot"]
-    asked = fly_and_judge(setup, reference="always")
+    asked = fly_and_judge(setup, FlightTask(reference="always"))
     assert asked.reference is not None
     assert asked.reference.airframe == judge_airframe_flight(setup, AIRCRAFT)
     assert asked.reference.deciding is None
@@ -484,7 +484,7 @@ def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
 
 def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[FlownMission, Path]) -> None:
     judged, _ = flown
-    alone = fly_and_judge(judged.setup, reference="never")
+    alone = fly_and_judge(judged.setup, FlightTask(reference="never"))
     assert alone.reference is None
     assert [(one.place, one.margin) for one in alone.verdict.failed] == [
         (one.place, one.margin) for one in judged.verdict.failed
