@@ -187,10 +187,10 @@ def _unflown_turn_text(
     """
     if "pass time" in measure:
         return "its legs were not flown one after the other"
-    if aligned is None or int(aligned.track.leg.max()) < waypoint:
+    if aligned is None or int(aligned.guidance_legs.max()) < waypoint:
         return "the flight did not get past it"
     active_times = [
-        float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (waypoint - 1, waypoint)
+        float(np.count_nonzero(aligned.guidance_legs == leg)) * aligned.tick for leg in (waypoint - 1, waypoint)
     ]
     leg = waypoint if active_times[1] <= active_times[0] else waypoint - 1
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
