@@ -38,7 +38,7 @@ from logs.verdict.tolerances import (
     MIN_AIRBORNE_AIRSPEED_MPS,
     SPEED_MEMORY_S,
 )
-from world.arrays import Flags, Floats, Ints, Singles
+from world.arrays import Flags, Floats, Singles
 from world.kernels import compiled, read_only
 
 RowNumbers = NDArray[np.int64]
@@ -70,7 +70,7 @@ class AlignedTrack:
     """
 
     track: Track
-    guidance_legs: Ints
+    guidance_legs: NDArray[np.int32]
     bad_rows: int
     first_bad: float
     apex_distance: Floats
