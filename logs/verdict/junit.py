@@ -5,8 +5,11 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
-from logs.verdict.findings import Finding
-from logs.verdict.presentation import finding_words
+from logs.verdict.findings import State
+from logs.verdict.presentation import FindingRow
+
+JunitResult = Literal["passed", "failure", "skipped", "error"]
+_RESULTS: dict[State, JunitResult] = {"ok": "passed", "fail": "failure", "open": "skipped", "unjudged": "skipped"}
 
 
 class JunitCase(NamedTuple):
@@ -19,7 +22,7 @@ class JunitCase(NamedTuple):
 
     classname: str
     name: str
-    result: Literal["passed", "failure", "skipped", "error"] = "passed"
+    result: JunitResult = "passed"
     message: str = ""
     text: str = ""
 
@@ -73,7 +76,7 @@ def suites_text(suites: Iterable[JunitSuite]) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...], *, passes: bool) -> JunitSuite:
+def verdict_suite(name: str, lines: Sequence[str], rows: Iterable[FindingRow], *, passes: bool) -> JunitSuite:
     """Return the test suite of a verdict.
 
     name: name of the judged plan or flight.
@@ -84,19 +87,13 @@ def verdict_suite(name: str, lines: Sequence[str], findings: tuple[Finding, ...]
     """
     cases = [answer_case("" if passes else "".join(lines[:1]))]
     counts: Counter[tuple[str, str]] = Counter()
-    for finding in findings:
-        place = _without_control_characters(finding.where)
-        counts[finding.rule, place] += 1
+    for row in rows:
+        rule, place = row.finding.rule, _without_control_characters(row.finding.where)
+        counts[rule, place] += 1
         # Names of cases must be unique.
-        number = counts[finding.rule, place]
-        case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
-        if finding.state == "fail":
-            message = f"{finding_words(finding).word}: {finding.reason}"
-            text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
-            case = case._replace(result="failure", message=message, text=text)
-        elif finding.state != "ok":
-            case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
-        cases.append(case)
+        case_name = place if counts[rule, place] == 1 else f"{place} ({counts[rule, place]})"
+        remedy = f"would pass: {row.remedy}" if row.remedy else ""
+        cases.append(JunitCase(f"planfly.{rule}", case_name, _RESULTS[row.finding.state], row.message, remedy))
     return JunitSuite(name, cases, "\n".join(lines))
 
 

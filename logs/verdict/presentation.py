@@ -1,9 +1,11 @@
 """Define how findings are shown: their signs, words and numbers, and their order by rule.
 
-The outputs read their texts here and in `logs.verdict.verdict.Verdict`: the document (``verdict.json``, and the list of
-the studio), lines of text (terminal), tables of HTML (report and notebook), JUnit XML, and the studio's map.
+Three renderings read their texts here and in `logs.verdict.verdict.Verdict`: the document (``verdict.json``, and the
+list of the studio), the lines of the terminal, and the rows of `FindingRow`, which HTML (report and notebook), JUnit
+XML and the studio's map lay out.
 """
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +22,13 @@ STATE_SIGNS: dict[State, str] = {"ok": "✓", "fail": "✗", "open": "?", "unjud
 STATE_WORDS: dict[State, str] = {"ok": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
 # Columns of a table of results, filled by `RuleFindings.cells`.
 RESULT_COLUMNS = ("rule", "result", "findings", "place", "planned", "flown", "limit", "margin", "unit")
+# Fraction of the limit within which a value is near the limit, if the margin's scale is not smaller.
+_NEAR_FRACTION = 0.1
+# Texts after a limit that name its source; limits from other sources are planfly's own.
+_LIMIT_SOURCE_TEXTS = {
+    "near the field": ", which applies near the field",
+    **{source: f", set by the {source}" for source in ("scenario", "aircraft", "autopilot", "mission")},
+}
 # Largest number of decimals with which a value is distinguished from its limit.
 _MAX_DECIMALS = 6
 # Texts of the overlap of a survey's photos.  It is shown apart from the photo lines, because it is no share of a line.
@@ -134,29 +143,124 @@ def number_texts(finding: Finding) -> NumberTexts:
     )
 
 
-def limit_violation_text(finding: Finding) -> str:
-    """Return how far a failed finding is beyond its limit and tolerance, with the unit.
-
-    Return "" for a finding that did not fail, or that has no limit or no margin.
-    """
-    if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
-        return ""
-    distance = -finding.margin - (finding.tolerance or 0.0)
-    # A count has no decimals.
-    return quantity_text(distance, finding.unit) if finding.unit == "legs" else format_quantity(distance, finding.unit)
-
-
-def method_text(finding: Finding) -> str:
-    """Return the method of a finding, with its limit and its tolerance if it has both."""
-    if not finding.tolerance or not finding.method or finding.limit is None:
-        return finding.method
-    limit, tolerance = (format_quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
-    return f"{finding.method}; limit {limit} with a tolerance of {tolerance}"
-
-
 def state_text(state: State) -> str:
     """Return a state as its sign and its word."""
     return f"{STATE_SIGNS[state]} {STATE_WORDS[state]}"
+
+
+class PlaceState(NamedTuple):
+    """State of a place on the studio's map.
+
+    state: "fail", "open" (not judged, therefore not flyable), "near" (close to a limit) or "ok".
+    closeness: margin divided by the margin below which a value is near its limit; negative beyond the limit.
+    text: short text of the finding, shown at the pointer.
+    """
+
+    state: str
+    closeness: float = math.inf
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FindingRow:
+    """A finding with its texts, which HTML, JUnit XML and the studio's map only lay out.
+
+    remedy: changes of the plan with which a failed finding would pass; "" if none is known.
+    """
+
+    finding: Finding
+    remedy: str = ""
+
+    @property
+    def word(self) -> str:
+        """Word of the rule."""
+        return finding_words(self.finding).word
+
+    @property
+    def result(self) -> str:
+        """Sign and word of the state."""
+        return state_text(self.finding.state)
+
+    @property
+    def numbers(self) -> NumberTexts:
+        """Numbers for a table."""
+        return number_texts(self.finding)
+
+    @property
+    def message(self) -> str:
+        """Reason of a failed or unjudged finding, after the word of its rule or "not judged"; "" if it passes."""
+        state = self.finding.state
+        return "" if state == "ok" else f"{self.word if state == 'fail' else STATE_WORDS[state]}: {self.finding.reason}"
+
+    @property
+    def excess(self) -> str:
+        """Distance of a failed finding beyond its limit and tolerance, with the unit.
+
+        "" for a finding that did not fail, or that has no limit or no margin.
+        """
+        finding = self.finding
+        if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
+            return ""
+        distance = -finding.margin - (finding.tolerance or 0.0)
+        # A count has no decimals.
+        is_count = finding.unit == "legs"
+        return quantity_text(distance, finding.unit) if is_count else format_quantity(distance, finding.unit)
+
+    @property
+    def method(self) -> str:
+        """Method of the finding, with its limit and its tolerance if it has both."""
+        finding = self.finding
+        if not finding.tolerance or not finding.method or finding.limit is None:
+            return finding.method
+        limit, tolerance = (format_quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
+        return f"{finding.method}; limit {limit} with a tolerance of {tolerance}"
+
+    @property
+    def place_state(self) -> PlaceState | None:
+        """State of the place according to the finding; None if the finding does not affect the state.
+
+        >>> from logs.verdict.findings import make_finding
+        >>> from logs.verdict.places import Place
+        >>> slope = make_finding(
+        ...     "slope", Place("leg", 1), ok=True, reason="", planned=13.5, limit=14.2, margin=0.7, unit="deg"
+        ... )
+        >>> FindingRow(slope).place_state
+        PlaceState(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
+        """
+        finding = self.finding
+        if finding.ok is None:
+            # The height of a leg is unknown where the leg leaves the terrain data.
+            is_leg_height = finding.rule == "clearance" and finding.place.kind == "leg"
+            is_shown = finding.state == "open" or (is_leg_height and finding.planned is None)
+            return PlaceState("open", 0.0, short_text(finding)) if is_shown else None
+        if finding.ok is False:
+            return PlaceState("fail", -math.inf if finding.margin is None else finding.margin, short_text(finding))
+        if finding.margin is None or finding.planned is None:
+            return None
+        closeness = _closeness(finding)
+        # The tolerance and its purpose are stated if the value is near its limit only without the tolerance.
+        with_tolerance = closeness < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
+        text = short_text(finding, with_tolerance=with_tolerance)
+        return PlaceState("near" if closeness < 1.0 else "ok", closeness, text)
+
+
+def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
+    """Return the margin of a finding divided by the margin below which a value is near its limit.
+
+    A value is near its limit within a tenth of the limit, but at most within the scale of the rule's margin.  Returns
+    infinity for a rule that has neither.
+
+    tolerance: added to the margin, in the finding's unit.
+    """
+    scale = RULE_WORDS[finding.rule].scale or math.inf
+    near_margin = min(scale, _NEAR_FRACTION * abs(finding.limit)) if finding.limit else scale
+    return ((finding.margin or 0.0) + tolerance) / near_margin if math.isfinite(near_margin) else math.inf
+
+
+def near_threat_text(name: str, distance: float, navigation_error: float) -> str:
+    """Describe a missile near a leg: its name, its distance outside the sphere, and a navigation error, all in m."""
+    error_text = f" (navigation error {quantity_text(navigation_error, 'm')})" if navigation_error > 0.0 else ""
+    return f"{RULE_WORDS['threat'].word} {name} {quantity_text(distance, 'm')} away{error_text}"
 
 
 def count_sentence(findings: Sequence[Finding]) -> str:
@@ -241,6 +345,29 @@ class RuleFindings:
             return finding_heading(worst_finding)
         count_text = f"{len(self.failed)} of {self.judged_count} places fail"
         return f"{self.words.word}: {count_text}; the worst is at {worst_finding.where}"
+
+    @property
+    def summary(self) -> str:
+        """Counts of the rule's findings and the finding closest to its limit.
+
+        If no finding of the rule was judged, the text states the reason.
+        """
+        if not self.judged_count:
+            return f"{'warning' if self.words.is_warning else 'not judged'}: {self.findings[0].reason}"
+        closest, margin = self.closest, self.words.margin
+        if closest is None or closest.margin is None or margin is None:
+            # Of several such findings the first stands for all.
+            return "; ".join(
+                [self.count_text, *(f"{finding.where}: {finding.reason}" for finding in self.passed_beyond_limit[:1])]
+            )
+        value, limit = closest.compared_texts()
+        if not value or not limit:
+            return self.count_text
+        relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
+        place_text = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
+        source_text = _LIMIT_SOURCE_TEXTS.get(closest.limit_source, "")
+        note = f"; {closest.tolerance_note}" if closest.tolerance_note else ""
+        return f"{self.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text}{note})"
 
     @property
     def cells(self) -> tuple[str, ...]:

@@ -20,9 +20,9 @@ from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.presentation import (
     RESULT_COLUMNS,
     STATE_SIGNS,
+    FindingRow,
     RuleFindings,
     findings_by_rule,
-    number_texts,
 )
 from logs.verdict.wording import text_after
 from world.extras import require_extra
@@ -264,6 +264,10 @@ class Verdict:
             parts.append(f"the plan as it is, with {values_text}")
         return "; ".join(parts)
 
+    def row(self, finding: Finding) -> FindingRow:
+        """Return a finding with its texts, including its remedy."""
+        return FindingRow(finding, self.remedy_text(finding))
+
     @property
     def first_remedied(self) -> Finding | None:
         """First failed finding with a remedy; a finding on ground contact comes before all others.
@@ -296,7 +300,7 @@ class Verdict:
 
         name: name of the judged plan or flight.
         """
-        return verdict_suite(name, self.lines, self.findings, passes=self.flyable)
+        return verdict_suite(name, self.lines, map(self.row, self.findings), passes=self.flyable)
 
     def to_junit(self, name: str) -> str:
         """Return the verdict as JUnit XML for continuous integration.
@@ -311,8 +315,8 @@ class Verdict:
         for rule in self.rules:
             word, state, tally, *_ = rule.cells
             rows += [
-                (word, state, tally, finding.where, *number_texts(finding), finding.reason, self.remedy_text(finding))
-                for finding in rule.failed
+                (word, state, tally, row.finding.where, *row.numbers, row.finding.reason, row.remedy)
+                for row in map(self.row, rule.failed)
             ] or [(*rule.cells, "", "")]
         return html_table(self.headline, rows, (*RESULT_COLUMNS, "reason", "would pass"))
 

@@ -260,8 +260,8 @@ def campaign(
     workers: number of processes on this machine; None for one per core.
     scheduler: address of a running dask scheduler, whose workers then fly.
     out: folder of the campaign's files; None keeps no files.
-    resume: True continues the campaign in the folder; arguments that are not given keep their earlier values, other than
-        workers and scheduler.
+    resume: True continues the campaign in the folder; arguments that are not given keep their earlier values,
+        except workers and scheduler.
     overwrite: True replaces the campaign in the folder.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
     Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.

@@ -16,7 +16,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.document import finding_document
 from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.places import Suggestion, TriedSuggestions
-from logs.verdict.presentation import finding_words
+from logs.verdict.presentation import PlaceState, finding_words
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
@@ -26,7 +26,7 @@ from logs.views.profile import terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_text
 from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import Window
-from planfly.studio.states import PlaceStates, State, place_states
+from planfly.studio.states import PlaceStates, place_states
 from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.mission_context import JudgedMission
 from world.airspace.zones_on_map import zone_rings, zone_walls
@@ -43,7 +43,7 @@ _MAX_LISTED_FINDINGS = 60
 _WALL_MARGIN_M = 50.0
 # Maximum number of zones and threats whose cross-sections the profile shows.
 _MAX_CUTS = 120
-_OK_STATE = State("ok")
+_OK_STATE = PlaceState("ok")
 # Closeness of a failure without a margin, which is infinite, in page data.
 _MIN_CLOSENESS = -1e6
 # Ratio of the drawn ground to the area, along each side.
@@ -258,8 +258,8 @@ def states_json(states: PlaceStates, first: int, last: int) -> Json:
     }
 
 
-def _state_data(state: State) -> list[str | float | None]:
-    """Return a state as page data: name, text, and closeness; the closeness is None if no limit is near.
+def _state_data(state: PlaceState) -> list[str | float | None]:
+    """Return a state as page data: its name, its text, and its closeness, or None if no limit is near.
 
     The page uses the closeness to find the worst of several laps past the same item.
     """

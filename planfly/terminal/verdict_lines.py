@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import flown_condition_lines
-from logs.verdict.presentation import RuleFindings, finding_heading, findings_by_rule
+from logs.verdict.presentation import finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
@@ -16,11 +16,6 @@ if TYPE_CHECKING:
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
 _MAX_LISTED = 6
-# Texts after a limit that name its source; limits from other sources are planfly's own.
-_LIMIT_SOURCE_TEXTS = {
-    "near the field": ", which applies near the field",
-    **{source: f", set by the {source}" for source in ("scenario", "aircraft", "autopilot", "mission")},
-}
 # Width of the column of rules, characters.
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
@@ -78,7 +73,7 @@ def verdict_lines(
     zone_count = 0 if verdict.conditions is None else verdict.conditions.zones
     for rule in verdict.rules:
         zone_count_text = f"{zone_count:,} zones; " if rule.words.name == "fence" and zone_count > 1 else ""
-        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{zone_count_text}{_rule_summary(rule)}")
+        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{zone_count_text}{rule.summary}")
     lines += [f"  note    {note}" for note in notes]
     if returns is not None and returns.line:
         is_warning = verdict.flyable and returns.has_failures
@@ -86,29 +81,6 @@ def verdict_lines(
         text = f"returns   {returns.line}{requirement}; planfly returns tries every second of the flight"
         lines.insert(1 if is_warning else len(lines), colour_text(text, "warning") if is_warning else text)
     return lines
-
-
-def _rule_summary(rule: RuleFindings) -> str:
-    """Return a text with the counts of a rule's findings, and the finding closest to its limit.
-
-    If no finding of the rule was judged, return the reason.
-    """
-    if not rule.judged_count:
-        return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
-    closest, margin = rule.closest, rule.words.margin
-    if closest is None or closest.margin is None or margin is None:
-        # Of several such findings the first stands for all.
-        return "; ".join(
-            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_beyond_limit[:1])]
-        )
-    value, limit = closest.compared_texts()
-    if not value or not limit:
-        return rule.count_text
-    relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
-    place_text = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
-    source_text = _LIMIT_SOURCE_TEXTS.get(closest.limit_source, "")
-    note = f"; {closest.tolerance_note}" if closest.tolerance_note else ""
-    return f"{rule.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text}{note})"
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:

@@ -126,7 +126,7 @@ def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) 
     start = 0 if first <= 0 else int(aligned.rows[first])
     end = len(aligned.track) if last >= legs - 1 else int(aligned.rows[last + 1]) + 1
     moves = straight_moves(aligned.track.position[start:end], aligned.track.time[start:end])
-    moves["leg"] = np.searchsorted(aligned.rows[1:-1], np.arange(start, start + len(moves)), side="right")
+    moves["leg"] = np.clip(aligned.track.leg[start : start + len(moves)], 0, legs - 1)
     return moves
 
 

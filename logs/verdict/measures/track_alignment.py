@@ -2,12 +2,13 @@
 
 All findings on a flight use this alignment.  Only time, position, velocity, attitude, airspeed, throttle, wind, current
 and energy are read.  The columns that guidance records about itself (leg, cross-track, height error, clearance) are not
-read, because a verdict must not depend on them.
+read, because a verdict must not depend on them.  The column ``leg`` is written again, by position.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,17 +51,15 @@ _MISSED_MARGIN_M = 50.0
 _CELLS = 40_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AlignedTrack:
     """Track of t usable rows, aligned with a route of w waypoints.
 
-    track: the usable rows.
+    track: the usable rows.  Their column ``leg`` is the last waypoint that the flight had passed, -1 before the first.
+    guidance_legs: leg to which the guidance steered in each row, as recorded, (t,).
     bad_rows: number of rows left out because of non-finite or implausible numbers, or of a time not later than before.
     first_bad: time of the first bad row, s; NaN if there is none.
-    rows: row nearest to the point at which the planned path passes each waypoint (apex), (w,), never decreasing; the
-        last row for a waypoint that the flight did not reach.
-    apex_distance: distance of that row from the apex, m, (w,).
-    passed: True for each waypoint that the flight passed, (w,).
+    apex_distance: distance of the waypoint's row from the point at which the planned path passes it (apex), m, (w,).
     course: course over the ground, unwrapped, rad, (t,).
     distance_run: distance along the ground track, m, (t,).
     clearance, clearance_fraction: minimum height above ground between a row and the next, m, and the fraction of the
@@ -71,11 +70,10 @@ class AlignedTrack:
     """
 
     track: Track
+    guidance_legs: NDArray[np.int32]
     bad_rows: int
     first_bad: float
-    rows: RowNumbers
     apex_distance: Floats
-    passed: NDArray[np.bool_]
     course: Floats
     distance_run: Floats
     clearance: Floats
@@ -83,6 +81,17 @@ class AlignedTrack:
     lift_gain: Floats
     tick: float
     draws_current: bool
+
+    @cached_property
+    def rows(self) -> RowNumbers:
+        """Row of each waypoint, in which its leg starts, (w,); the last row for a waypoint that was not passed."""
+        first_rows = np.searchsorted(self.track.leg, np.arange(len(self.apex_distance)))
+        return np.minimum(first_rows, len(self.track) - 1)
+
+    @cached_property
+    def passed(self) -> Flags:
+        """Mask of the waypoints that the flight passed, (w,)."""
+        return np.asarray(np.arange(len(self.apex_distance)) <= self.track.leg[-1])
 
     def leg_rows(self, leg: int) -> slice:
         """Return the rows between a leg's two waypoints, both included."""
@@ -113,7 +122,7 @@ class AlignedTrack:
 
     def leg_at(self, row: int) -> int:
         """Return the leg on which a row was flown; the last row belongs to the leg of the row before it."""
-        return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
+        return int(np.clip(self.track.leg[min(row, len(self.track) - 2)], 0, len(self.rows) - 2))
 
     def position_text(self, row: int, fraction: float = 0.0) -> str:
         """Describe the position in a row, or at a fraction (0 to 1) of the segment to the next row."""
@@ -168,7 +177,6 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     passed = ((rows < last_row) & ~is_far_ahead) | (distances <= arrival_radius)
     passed &= np.arange(len(rows)) <= progress.target
     passed = np.logical_and.accumulate(passed)
-    rows[~passed] = last_row
     # If the track ends inside the arrival circle of the last passed waypoint, before the waypoint itself, the autopilot
     # is already on the next leg: the waypoint's row is then the entry into this circle.
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
@@ -177,7 +185,8 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         distances = np.hypot(*(usable_track.position[previous_row:, :2] - centers[last_passed]).T)
         rows_outside = np.flatnonzero(distances > arrival_radius[last_passed])
         entry_row = previous_row + (int(rows_outside[-1]) + 1 if rows_outside.size else 0)
-        rows[last_passed] = min(last_row - 1, entry_row)
+        rows[: last_passed + 1] = np.minimum(rows[: last_passed + 1], min(last_row - 1, entry_row))
+    legs = np.searchsorted(rows[passed], np.arange(last_row + 1), side="right") - 1
     steps = np.diff(usable_track.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
     terrain = requirements.setup.scenario.terrain
@@ -185,12 +194,11 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     if terrain is not None:
         clearance, clearance_fraction = path_clearance(terrain.heights, terrain.to_pixel.record, usable_track.position)
     return AlignedTrack(
-        track=usable_track,
+        track=replace(usable_track, leg=legs.astype(np.int32)),
+        guidance_legs=usable_track.leg,
         bad_rows=int(is_usable.size - is_usable.sum()),
         first_bad=first_bad,
-        rows=rows,
         apex_distance=distance,
-        passed=passed,
         course=np.append(course, course[-1]),
         distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
         clearance=clearance,

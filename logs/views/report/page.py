@@ -23,15 +23,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
 from logs.verdict.measures.track_alignment import with_legs
-from logs.verdict.presentation import (
-    RESULT_COLUMNS,
-    count_sentence,
-    finding_words,
-    limit_violation_text,
-    method_text,
-    number_texts,
-    state_text,
-)
+from logs.verdict.presentation import RESULT_COLUMNS, count_sentence
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
 from logs.views import figures
@@ -299,19 +291,12 @@ def _render_page(
     return page_template("report.html").render(
         name=setup.scenario.name,
         verdict=verdict,
-        texts={
-            "method": method_text,
-            "missed": limit_violation_text,
-            "numbers": number_texts,
-            "state": state_text,
-            "words": finding_words,
-        },
         flown=track is not None,
         counts=count_sentence(verdict.findings),
         flight_line=tables.flight_sentence(setup, track),
         result_columns=RESULT_COLUMNS,
         rules=[rule for rule in verdict.rules if rule.state != "fail"],
-        findings=sorted(verdict.findings, key=lambda finding: STATE_ORDER.index(finding.state)),
+        rows=sorted(map(verdict.row, verdict.findings), key=lambda row: STATE_ORDER.index(row.finding.state)),
         notes=[
             note
             for note in tables.mission_notes(setup)

@@ -12,11 +12,10 @@ from logs.verdict.document import finding_document
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Place
-from logs.verdict.presentation import number_texts
+from logs.verdict.presentation import FindingRow, number_texts
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import change_text, place_text, shorten_statement, suggestion_text, suggestions_text
-from planfly.studio.states import finding_state
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import leg, missile, of, suggested, waypoint
 from tests.synthetic import envelope, make_setup
@@ -88,7 +87,7 @@ def test_limit_of_a_value_within_its_tolerance_is_shown_without_it() -> None:
     assert (document.limit, document.passes) == (-5.09, "≥ -5.59°")
     row = number_texts(finding)
     assert (row.limit, row.margin) == ("≥\u00a0\N{MINUS SIGN}5.09", "\N{MINUS SIGN}0.29")
-    state = finding_state(finding)
+    state = FindingRow(finding).place_state
     assert state is not None
     assert state.text == "slope -5.38° (≥ -5.09°, less a tolerance of 0.5°)"
 

@@ -6,7 +6,8 @@ import pytest
 from flight.mission.items import Frame, Mission, MissionItem
 from logs.verdict.findings import make_finding
 from logs.verdict.places import Place
-from planfly.studio.states import finding_state, place_states
+from logs.verdict.presentation import FindingRow
+from planfly.studio.states import place_states
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from world.frames import to_geo
 
@@ -33,7 +34,7 @@ def test_a_value_is_near_its_limit_within_a_tenth_of_it(
     finding = make_finding(
         rule, Place("leg", 0), ok=True, reason="", planned=value, limit=limit, margin=limit - value, unit=unit
     )
-    found = finding_state(finding)
+    found = FindingRow(finding).place_state
     assert found is not None
     assert found.state == state
 
@@ -43,7 +44,7 @@ def test_a_limit_of_zero_leaves_the_scale_of_its_rule() -> None:
         finding = make_finding(
             "bounds", Place("leg", 0), ok=True, reason="", planned=margin, limit=0.0, margin=margin, unit="m"
         )
-        found = finding_state(finding)
+        found = FindingRow(finding).place_state
         assert found is not None
         assert found.state == state
 
@@ -75,7 +76,7 @@ def test_a_place_says_what_its_limit_is_without_the_tolerance_that_leaves_it_roo
         unit="m",
         at_least=at_least,
     )
-    found = finding_state(finding)
+    found = FindingRow(finding).place_state
     assert found is not None
     assert found.text == text
 

@@ -91,10 +91,10 @@ def test_what_came_after_the_last_waypoint_belongs_to_the_last_leg() -> None:
     longer = replace(
         aligned,
         track=replace(
-            track,
+            aligned.track,
             **{
                 name: np.concatenate([column, np.repeat(column[-1:], count, axis=0)])
-                for name, column in ((field.name, getattr(track, field.name)) for field in fields(track))
+                for name, column in ((field.name, getattr(aligned.track, field.name)) for field in fields(track))
                 if isinstance(column, np.ndarray) and len(column) == len(track)
             },
         ),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from tests.logs.verdict.judging import judge
 from tests.synthetic import (
     fly_path,
@@ -31,8 +31,15 @@ def test_a_short_leg_within_a_turn_has_the_segment_at_which_both_of_its_waypoint
     flown = align_track(route_requirements(setup), fly_path(setup, rate=20.0))
     assert flown is not None
     last = len(flown.track) - 1
-    at = replace(flown, rows=np.array([5, 400, 400, last - 3]))
+
+    def passing(*rows: int) -> AlignedTrack:
+        legs = np.searchsorted(rows, np.arange(last + 1), side="right") - 1
+        return replace(flown, track=replace(flown.track, leg=legs))
+
+    at = passing(5, 400, 400, last - 3)
+    assert at.rows.tolist() == [5, 400, 400, last - 3]
     assert [at.leg_segments(leg) for leg in range(3)] == [(0, 400), (400, 401), (400, last)]
     # A flight that ended on leg 1 never passed its end.
-    ended = replace(at, rows=np.array([0, 400, last, last]), passed=np.array([True, True, False, False]))
+    ended = passing(0, 400)
+    assert ended.passed.tolist() == [True, True, False, False]
     assert [ended.leg_segments(leg) for leg in range(3)] == [(0, 400), (400, last), (0, 0)]

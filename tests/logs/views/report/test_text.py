@@ -13,7 +13,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import Spread, compare_with_model
 from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, Place
-from logs.verdict.presentation import finding_words, findings_by_rule, limit_violation_text, number_texts
+from logs.verdict.presentation import FindingRow, finding_words, findings_by_rule, number_texts
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
@@ -52,7 +52,7 @@ def test_a_failed_finding_states_by_how_much_it_missed(
     item = replace(
         failed(rule, flown, limit, margin), tolerance=tolerance, unit="legs" if rule == "completion" else "m"
     )
-    assert (limit_violation_text(item), limit_violation_text(replace(item, ok=True))) == (missed, "")
+    assert (FindingRow(item).excess, FindingRow(replace(item, ok=True)).excess) == (missed, "")
 
 
 def test_tables_call_a_rule_as_the_terminal_does() -> None:
