@@ -55,7 +55,8 @@ def verdict_lines(
             more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
             lines.append(f"          also at {other_places}{more_text}")
     # State that no change passed its trial, unless a finding has a suggestion or a line names the parameter that
-    # decides.  Findings on returns state their own remedy.  After a failed flight, this is stated only if the planned route fails, too.
+    # decides.  Findings on returns state their own remedy.  After a failed flight, this is stated only if the planned
+    # route fails, too.
     is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
     has_suggestion = verdict.deciding is not None or any(finding.suggestions for finding in verdict.failed)
     has_hint = has_suggestion or all(finding.rule == "return" for finding in verdict.failed)

@@ -596,7 +596,8 @@ def judge_returns(
         ]
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
         returns += reported_returns
-    parameters = world.autopilot.parameters
+    parameters, trials = world.autopilot.parameters, world.autopilot.returns.trials
+    ending_names = {name for ending in trials.endings for name in ending if world.ending == "straight to land"}
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
         each=tuple(returns),
@@ -615,7 +616,7 @@ def judge_returns(
         landings=world.landings,
         autopilot=world.autopilot.title,
         path_text=world.autopilot.returns.path_text,
-        trials_text=world.autopilot.returns.trials.text,
+        trials_text=", ".join([*ending_names, trials.text]),
     )
 
 

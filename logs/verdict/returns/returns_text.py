@@ -295,7 +295,7 @@ def describe_rtl_ending(returns: Returns) -> list[str]:
         case 1, True:
             text = f"from its loiter a return continues to the landing sequence at {items_text}"
         case 2, True:
-            text = f"a return flies straight to the landing sequence at {items_text}"
+            text = f"a return flies straight to the landing sequence at {items_text}; RTL_ALTITUDE has no effect"
         case 3, _:
             text = f"the landing sequence is for go-arounds only: {loiter_text}"
         case 4, _:
