@@ -21,10 +21,10 @@ from logs.verdict.returns.judge_returns import (
     TURN_HEIGHT_LOSS_M,
     Returns,
     ReturnWorld,
+    deepest_violation,
     exclude_approaches,
     flies_landing_approach,
     heights_above_ground,
-    most_violated_zone,
     possible_heights,
     required_heights,
 )
@@ -177,7 +177,7 @@ def _meets_criterion(
         energy_left = world.setup.battery - np.nan_to_num(starts.energy_used) - results["energy"]
         is_met &= ~(energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery)
     for k, path in enumerate(simulated.tracks):
-        is_met[k] = is_met[k] and (len(path) < 2 or most_violated_zone(world, path) < 0)
+        is_met[k] = is_met[k] and (len(path) < 2 or deepest_violation(world, path) is None)
     return is_met
 
 
