@@ -71,12 +71,12 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
 
 
 def test_too_few_flights_for_all_directions_are_stated_at_once(
-    asked: list[tuple[CampaignBase, WindsGoal]], capsys: pytest.CaptureFixture[str]
+    asked: list[tuple[CampaignBase, WindsGoal]], caplog: pytest.LogCaptureFixture
 ) -> None:
     text = "cannot judge all 4 directions; that needs at least 600 flights"
     for flights, is_warned in ((150, True), (599, True), (600, False)):
         planfly.winds("paper-07", directions=4, flights=flights)
-        assert (f"warning: {flights} flights {text}" in capsys.readouterr().err) is is_warned
+        assert (f"warning: {flights} flights {text}" in caplog.text) is is_warned
     assert len(asked) == 3
 
 

@@ -51,8 +51,9 @@ def flown_here() -> Iterator[None]:
 
 @pytest.mark.usefixtures("flown_here", "undrawn")
 def test_a_short_mission_has_its_chart_stopped_or_not(
-    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(find_winds, "MIN_FLIGHTS_PER_DIRECTION", 8)
     out = tmp_path / "out"
     answer = answered(capsys, 3, *line, "--flights", "8", "--out", str(out))
     assert {path.name for path in out.iterdir()} == {"winds.html", "winds.json", "winds.png", WINDS_DATABASE}
