@@ -167,8 +167,9 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
     def read_metres(table: Any, key: str, most: float) -> float:
         """Return the distance under a key, m, or 0 without a distance of 0 to `most`."""
         value = table.get(key) if isinstance(table, dict) else None
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        return float(value) if is_number and 0.0 <= value <= most else 0.0
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return 0.0
+        return float(value) if 0.0 <= value <= most else 0.0
 
     calc, camera = settings.get("CameraCalc"), None
     # A camera that QGC calls manual has only distances.
