@@ -402,11 +402,16 @@ def _airframe_or_autopilot_lines(
 ) -> list[str]:
     """Return a line if the airframe can fly the mission but the autopilot cannot, otherwise [].
 
-    The line names the parameter that decides, if it is known.
+    The line names the parameter that decides, if it is known.  If the flight of the airframe is undecided, the line
+    names only the parameter.
     """
-    answers = {level.name: level.flyable for level in levels}
-    if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
+    answers = {level.name: level for level in levels}
+    airframe = answers.get("airframe")
+    if "autopilot" not in answers or answers["autopilot"].flyable or levels[-1].undecided or airframe is None:
         return []
+    if not airframe.flyable:
+        is_named = airframe.undecided and deciding is not None
+        return [f"A parameter decides: {deciding_text(deciding)}, as far as it can be judged"] if is_named else []
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameter values are always tried with the simulated control law, even if the autopilot's program flew.
     flew_program = setup.autopilot.program is not None
