@@ -410,8 +410,9 @@ def _airframe_or_autopilot_lines(
     if "autopilot" not in answers or answers["autopilot"].flyable or levels[-1].undecided or airframe is None:
         return []
     if not airframe.flyable:
-        is_named = airframe.undecided and deciding is not None
-        return [f"A parameter decides: {deciding_text(deciding)}, as far as it can be judged"] if is_named else []
+        if deciding is None or not airframe.undecided:
+            return []
+        return [f"A parameter decides: {deciding_text(deciding)}, as far as it can be judged"]
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameter values are always tried with the simulated control law, even if the autopilot's program flew.
     flew_program = setup.autopilot.program is not None
