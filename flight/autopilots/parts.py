@@ -314,12 +314,14 @@ class ReturnTrials(NamedTuple):
     altitudes: groups of parameters of the RTL's height, with their present values, m. A trial sets all parameters of a
         group to the same height, but lowers none. The tried heights begin at the present value of the first parameter.
     others: other changes, as values by name; each is tried alone and together with a greater height.
+    endings: changes with which RTLs do not fly straight to a landing sequence, so that the RTL's height has an effect.
     text: names of all these parameters, in messages.
     """
 
     altitudes: tuple[Mapping[str, float], ...] = ()
     others: tuple[Mapping[str, float], ...] = ()
     text: str = ""
+    endings: tuple[Mapping[str, float], ...] = ()
 
 
 NO_TRIALS = ReturnTrials()

@@ -269,12 +269,15 @@ class SurveyPlan:
     turn_around: extension of its lines beyond their photos, m.
     camera: camera, or None if only distances are known.
     stated_photo: distance between photos by the settings of the camera, m; 0 if they state none.
+    height: height of the lines by the settings of the camera, above home or above the ground, m; 0 if they state none,
+        or if the lines follow the terrain.
     """
 
     photo: float | None
     turn_around: float = 0.0
     camera: Camera | None = None
     stated_photo: float = 0.0
+    height: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

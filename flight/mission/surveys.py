@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aircraft.envelope import ground_speed
-from flight.mission.items import Command, Mission, SurveyPlan, is_navigation
+from flight.mission.items import AMSL, Command, Mission, SurveyPlan, is_navigation
 from flight.mission.route import Route
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
@@ -61,6 +61,8 @@ _MIN_LINES_WITH_PHOTOS = 2
 _DUPLICATE_LINE_FRACTION = 0.2
 # Ratio up to which a trigger distance may differ from the camera's settings without a note.
 _STATED_SPACING_TOLERANCE = 0.02
+# Ratio up to which the height of a survey's items may differ from the camera's settings without a note.
+_STATED_HEIGHT_TOLERANCE = 0.02
 # Tolerance for equal distances between photos, m: ground stations write this distance in single precision.
 _PHOTO_SPACING_TOLERANCE_M = 0.01
 
@@ -237,7 +239,7 @@ def survey_plan(mission: Mission, photo_spacing: float) -> SurveyPlan | None:
 def camera_notes(
     mission: Mission, route: Route, wind: Wind, airspeed_factor: Callable[[float], float]
 ) -> tuple[str, ...]:
-    """Return notes on trigger distances that contradict the camera's settings, or are too short for the camera.
+    """Return notes on trigger distances and heights that contradict the camera's settings or abilities.
 
     airspeed_factor: function that returns the ratio of true airspeed to the route's airspeeds at an altitude, m AMSL.
     """
@@ -251,6 +253,14 @@ def camera_notes(
         if plan.stated_photo and abs(plan.stated_photo / photo_spacing - 1.0) > _STATED_SPACING_TOLERANCE:
             stated_text = f"{plan.stated_photo:.4g} m (AdjustedFootprintFrontal)"
             notes.append(f"{text}, but the settings of its camera in the file state {stated_text}")
+        seqs = {int(seq) for leg in legs for seq in route.items[leg : leg + 2]}
+        heights = {item.alt for item in mission.items if item.seq in seqs and item.frame not in AMSL}
+        farthest_height = max(heights, key=lambda height: abs(height - plan.height), default=plan.height)
+        if plan.height and abs(farthest_height / plan.height - 1.0) > _STATED_HEIGHT_TOLERANCE:
+            notes.append(
+                f"the camera's settings of a survey in the file state a height of {plan.height:.4g} m"
+                f" (DistanceToSurface), but its items state {farthest_height:.4g} m"
+            )
         if plan.camera is None or plan.camera.interval <= 0.0:
             continue
         # The highest ground speed in the mean wind; NaN if none of the courses can be held.

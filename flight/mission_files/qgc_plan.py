@@ -156,16 +156,21 @@ class _CameraCalc(BaseModel):
 
 
 def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warnings: list[str]) -> SurveyPlan:
-    """Return the settings that a survey stores in addition to its items: line extension and camera.
+    """Return the settings that a survey stores in addition to its items: line extension, camera and height.
 
     settings: content of the survey's TransectStyleComplexItem.
     items: simple items of the survey, which state the distance between photos.
 
     An invalid camera is left out, and a warning is added.
     """
-    turn_around = settings.get("TurnAroundDistance")
-    if isinstance(turn_around, bool) or not isinstance(turn_around, int | float) or not 0.0 <= turn_around <= 1e5:
-        turn_around = 0.0
+
+    def read_metres(table: Any, key: str, most: float) -> float:
+        """Return the distance under a key, m, or 0 without a distance of 0 to `most`."""
+        value = table.get(key) if isinstance(table, dict) else None
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return 0.0
+        return float(value) if 0.0 <= value <= most else 0.0
+
     calc, camera = settings.get("CameraCalc"), None
     # A camera that QGC calls manual has only distances.
     if isinstance(calc, dict) and calc.get("FocalLength") is not None:
@@ -176,9 +181,6 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
             field = ".".join(map(str, fault["loc"]))
             shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
             warnings.append(f"{location}: CameraCalc.{field}: {shown}: the camera is ignored, and no overlap is judged")
-    stated_photo = calc.get("AdjustedFootprintFrontal") if isinstance(calc, dict) else 0.0
-    if isinstance(stated_photo, bool) or not isinstance(stated_photo, int | float) or not 0.0 < stated_photo <= 1e6:
-        stated_photo = 0.0
     # The longest distance between photos that the items state, m; 0 if no item states one.
     trigger_distance = 0.0
     for item in items:
@@ -187,7 +189,13 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
             metres = params[0]
             if isinstance(metres, int | float) and not isinstance(metres, bool) and 0.0 < metres <= 1e6:
                 trigger_distance = max(trigger_distance, float(metres))
-    return SurveyPlan(trigger_distance, float(turn_around), camera, float(stated_photo))
+    return SurveyPlan(
+        trigger_distance,
+        read_metres(settings, "TurnAroundDistance", 1e5),
+        camera,
+        read_metres(calc, "AdjustedFootprintFrontal", 1e6),
+        0.0 if settings.get("FollowTerrain") is True else read_metres(calc, "DistanceToSurface", 1e6),
+    )
 
 
 def _landing_items(item: dict[str, Any], source: str, location: str, number: int) -> list[Any]:

@@ -115,6 +115,7 @@ class _SurveyPlan(SetupModel):
     turn_around: Annotated[Finite, Field(ge=0.0, alias="turn_around_m")]
     camera: _Camera | None
     stated_photo: Annotated[Finite, Field(ge=0.0, alias="stated_photo_m")] = 0.0
+    height: Annotated[Finite, Field(ge=0.0, alias="height_m")] = 0.0
 
     def plan(self) -> SurveyPlan:
         """Return the survey plan of the table."""

@@ -237,6 +237,10 @@ class FindingRow:
             return PlaceState("fail", -math.inf if finding.margin is None else finding.margin, short_text(finding))
         if finding.margin is None or finding.planned is None:
             return None
+        is_tolerated = (finding.limit or 0.0) <= (finding.tolerance or 0.0)
+        if finding.rule == "waypoint" and finding.limit_source == "autopilot" and is_tolerated:
+            # At a nearly straight waypoint, ArduPlane's acceptance radius is about zero: no value is near it.
+            return PlaceState("ok", text=short_text(finding))
         closeness = _closeness(finding)
         # The tolerance and its purpose are stated if the value is near its limit only without the tolerance.
         with_tolerance = closeness < 1.0 <= _closeness(finding, finding.tolerance or 0.0)

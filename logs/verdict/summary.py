@@ -306,7 +306,8 @@ def summary_lines(
         for finding in findings
         if finding.ok is False
     ):
-        lines += _airframe_or_autopilot_lines(levels, deciding, setup)
+        is_refused = any(finding.rule == "mission" and finding.ok is False for finding in findings)
+        lines += _airframe_or_autopilot_lines(levels, deciding, setup, is_refused=is_refused)
     # The failed leg with the longest time at the pitch limit.
     failed_places = {finding.place for finding in findings if finding.ok is False}
     pitch_times = [
@@ -398,20 +399,30 @@ def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tupl
 
 
 def _airframe_or_autopilot_lines(
-    levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup
+    levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup, *, is_refused: bool
 ) -> list[str]:
     """Return a line if the airframe can fly the mission but the autopilot cannot, otherwise [].
 
-    The line names the parameter that decides, if it is known.
+    The line names the parameter that decides, if it is known.  If the flight of the airframe is undecided, the line
+    names only the parameter.
+
+    is_refused: True if the autopilot would reject an item of the mission, which no other parameters change.
     """
-    answers = {level.name: level.flyable for level in levels}
-    if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
+    answers = {level.name: level for level in levels}
+    airframe = answers.get("airframe")
+    if "autopilot" not in answers or answers["autopilot"].flyable or levels[-1].undecided or airframe is None:
         return []
+    if not airframe.flyable:
+        if deciding is None or not airframe.undecided:
+            return []
+        return [f"A parameter decides: {deciding_text(deciding)}, as far as it can be judged"]
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameter values are always tried with the simulated control law, even if the autopilot's program flew.
     flew_program = setup.autopilot.program is not None
     no_value_text = ": no parameter value that was tried lets the flight pass with a margin for simulation errors"
     reason = "" if flew_program or not parameters_note else no_value_text
+    if is_refused:
+        parameters_note, reason = "", ": it rejects an item of the mission"
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if flew_program else ''}"
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]

@@ -501,14 +501,22 @@ def _unit_suffix(unit: str) -> str:
 _MAX_DIGITS = 9
 
 
-def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
+def compared_texts(value: float, limit: float, unit: str, decimals: int | None = None) -> tuple[str, str]:
     """Format a value and its limit with their unit, with enough digits to show that they differ if they do.
+
+    decimals: smallest number of decimals; None for three significant digits.
 
     >>> compared_texts(-7.04, -7.02, "deg"), compared_texts(12.0, 15.0, "m")
     (('-7.04°', '-7.02°'), ('12 m', '15 m'))
     >>> compared_texts(30.0004, 30.0, "m/s")
     ('30.0004 m/s', '30 m/s')
+    >>> compared_texts(80.0, 80.3, "m", 0), compared_texts(76.2, 80.3, "m", 0)
+    (('80.0 m', '80.3 m'), ('76 m', '80 m'))
     """
+    if decimals is not None:
+        while decimals < _MAX_DIGITS and value != limit and f"{value:.{decimals}f}" == f"{limit:.{decimals}f}":
+            decimals += 1
+        return _with_unit(f"{value:.{decimals}f}", unit), _with_unit(f"{limit:.{decimals}f}", unit)
     digits = 3
     while (
         digits < _MAX_DIGITS

@@ -402,6 +402,12 @@ def winds(
         folder = directory.folder
         numbers = {"target": prove, "confidence": confidence, "directions": directions, "most": most}
         goal = make_winds_goal({**numbers, "flights": flights}, folder, resume=resume)
+        goal.check_flights()
+        if goal.flights < goal.judging_flights:
+            report_line(
+                f"warning: {count_text(goal.flights, 'flight')} cannot judge all {goal.directions} directions; that"
+                f" needs at least {count_text(goal.judging_flights, 'flight')}"
+            )
         mission_options = _with_stored_options(options, directory)
         spread = mission_options["spread"]
         base = _open_base(target, mission_options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)

@@ -33,6 +33,7 @@ from planfly.campaigns.tables import (
     read_stored_settings,
 )
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
+from world.errors import ArgumentError
 from world.wording import count_text
 
 # Largest half-width of the interval of an accurate boundary, m/s.
@@ -74,6 +75,20 @@ class WindsGoal:
     directions: int
     most: float
     flights: int
+
+    @property
+    def judging_flights(self) -> int:
+        """Number of flights with which all directions can be judged."""
+        return MIN_FLIGHTS_PER_DIRECTION * self.directions
+
+    def check_flights(self) -> None:
+        """Raise ArgumentError if the flights are too few to judge any direction."""
+        if self.flights < MIN_FLIGHTS_PER_DIRECTION:
+            allowed = (
+                f"expected at least {MIN_FLIGHTS_PER_DIRECTION}, or no direction can be judged; all {self.directions}"
+                f" directions need {self.judging_flights:,} flights"
+            )
+            raise ArgumentError.of_argument("flights", self.flights, allowed)
 
 
 # Goal of a search without any of its options.

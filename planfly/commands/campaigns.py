@@ -114,7 +114,7 @@ def add_winds_parser(command_line: LineParser) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="maximum number of flights, all directions together (default: 5000)",
+        help="maximum number of flights, all directions together, at least 150 (default: 5000)",
     )
 
 

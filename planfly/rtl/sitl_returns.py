@@ -29,8 +29,8 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
     can_start_in_jsbsim,
     classify_return,
+    deepest_violation,
     limit_ratio,
-    most_violated_zone,
     worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -284,7 +284,8 @@ def _judge_flown_return(
     record["clearance"], record["sphere_distance"], record["threat"] = clearance, approach.outside, approach.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
     remaining_energy = simulated_return.energy_left + simulated_return.energy - used_energy
-    zone = most_violated_zone(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
+    violation = deepest_violation(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else None
+    zone = -1 if violation is None else violation.zone
     return replace(
         simulated_return,
         target=target,
@@ -294,6 +295,7 @@ def _judge_flown_return(
         sphere_distance=approach.outside,
         threat=approach.threat,
         zone=zone,
+        violation=violation,
         energy=used_energy,
         energy_left=remaining_energy,
     )

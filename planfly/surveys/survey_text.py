@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
-from logs.verdict.rules.survey_rule import crab_text, overlap_text, unusable_parts_text, usable_text
+from logs.verdict.rules.survey_rule import crab_text, overlap_text, relief_text, unusable_parts_text, usable_text
 from logs.verdict.tolerances import PHOTO_OVERLAP_TOLERANCE
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 from world.wording import count_text
@@ -115,11 +115,13 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
         is_slow = check == FRONT_OVERLAP and measure.is_camera_limited
         if check in faults and is_slow:
             texts[number] += f". T{slow_camera_text(measure)[1:]}"
-        elif check in faults and spacing is not None and spacing >= 1.0:
+        elif check in faults and not measure.is_lost_by_relief and spacing is not None and spacing >= 1.0:
             texts[number] += (
                 f". The {name} must be at most {math.floor(spacing)} m apart, because the lowest photos are taken"
                 f" {measure.min_height:.0f} m above ground"
             )
+    if measure.is_lost_by_relief:
+        texts.append(relief_text(measure))
     if measure.side is not None and measure.side_area < measure.side - MIN_STATED_AREA_LOSS:
         texts.append(crab_text(measure))
     if measure.unusable_fraction > MIN_STATED_FRACTION:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import flown_condition_lines
+from logs.verdict.findings import Finding
 from logs.verdict.presentation import finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
 _MAX_LISTED = 6
+# Maximum number of failed findings of a rule whose suggestions are stated.
+_MAX_SUGGESTED = 5
 # Width of the column of rules, characters.
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
@@ -35,26 +38,31 @@ def verdict_lines(
     """
     lines = [colour_text(verdict.headline, STATE_STYLES[verdict.state]), *verdict.details]
     for rule in verdict.failed_rules:
-        # The worst finding, its suggestion or else that of another finding, and the other failed places.
+        # The worst finding, the suggestions of the rule's findings, and the other failed places.
         worst_finding, *other_findings = rule.failed
         lines.append(colour_text("  failed  ", "bad") + f"{rule.failure_heading}: {worst_finding.reason}")
-        if worst_finding.suggestions:
-            lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
-        elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):
-            helped_text = f"at {helped_finding.where}: {helped_finding.suggestion}"
-            lines.append(colour_text("          would pass: ", "hint") + helped_text)
-        elif worst_finding.rule == "return" and worst_finding.limit_source == "scenario":
+        # The first finding with each suggestion: several findings may have the same one.
+        helped_findings: dict[str, Finding] = {}
+        for finding in rule.failed:
+            if finding.suggestions:
+                helped_findings.setdefault(finding.suggestion, finding)
+        for suggestion, finding in list(helped_findings.items())[:_MAX_SUGGESTED]:
+            place_text = "" if finding is worst_finding else f"at {finding.where}: "
+            lines.append(colour_text("          would pass: ", "hint") + place_text + suggestion)
+        if len(helped_findings) > _MAX_SUGGESTED:
+            lines.append(f"          would pass: and {len(helped_findings) - _MAX_SUGGESTED} more, in --json")
+        if not helped_findings and worst_finding.rule == "return" and worst_finding.limit_source == "scenario":
             lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
         if other_findings:
             other_places = "; ".join(finding.place_and_value for finding in other_findings[:_MAX_LISTED])
             more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
             lines.append(f"          also at {other_places}{more_text}")
-    # State that no change passed its trial, unless a finding has a suggestion.  Findings on returns state their own
-    # remedy.  After a failed flight, this is stated only if the planned route fails, too.
+    # State that no change passed its trial, unless a finding has a suggestion or a line names the parameter that
+    # decides.  Findings on returns state their own remedy.  After a failed flight, this is stated only if the planned
+    # route fails, too.
     is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
-    has_hint = any(finding.suggestions for finding in verdict.failed) or all(
-        finding.rule == "return" for finding in verdict.failed
-    )
+    has_suggestion = verdict.deciding is not None or any(finding.suggestions for finding in verdict.failed)
+    has_hint = has_suggestion or all(finding.rule == "return" for finding in verdict.failed)
     no_change_text = ""
     if is_judged and not has_hint and verdict.level == "geometric":
         no_change_text = "no change was found with which it would pass"

@@ -69,7 +69,7 @@ from world.errors import FlightError
 from world.files import temporary_folder
 
 # ----------------------------------------------------------------------
-# Read the values of a parameter file that describe the aircraft: those that differ from the autopilot's defaults.
+# Read the values of a parameter file that describe the aircraft: the bank limit, and what differs from the defaults.
 
 # Parameters of ArduPlane that describe an aircraft.  Their equivalent airspeeds are used as the airspeeds of the sheet.
 _USED_PARAMETERS = (
@@ -96,7 +96,7 @@ _SETTINGS = ("AIRSPEED_CRUISE", "ROLL_LIMIT_DEG")
 
 @dataclass(frozen=True, slots=True)
 class AircraftParameters:
-    """Parameters of an autopilot's file that describe the aircraft and differ from their defaults.
+    """Parameters of an autopilot's file that describe the aircraft.
 
     values: value of each parameter in ArduPlane's unit, by its current ArduPlane name.  AIRSPEED_STALL is only read
         from PX4 files.
@@ -108,7 +108,9 @@ class AircraftParameters:
 
 
 def read_aircraft_parameters(file: Path) -> AircraftParameters:
-    """Read the non-default parameters of an ArduPlane or PX4 file that describe the aircraft.
+    """Read the parameters of an ArduPlane or PX4 file that describe the aircraft.
+
+    Parameters at their defaults are left out, except the bank limit.
 
     Raises ParameterError if the file cannot be read, is for another vehicle, or has only names that neither autopilot
     knows.
@@ -128,7 +130,10 @@ def read_aircraft_parameters(file: Path) -> AircraftParameters:
                 entry = (value / factor, default / factor, f"{px4_name} {value:g}")
         else:
             entry = _arduplane_value(entries, name)
-        if entry is not None and abs(entry[0] - entry[1]) > 1e-6 * max(1.0, abs(entry[1])):
+        if entry is None:
+            continue
+        # A default describes no aircraft, but a stated bank limit is the limit with which the autopilot flies.
+        if name == "ROLL_LIMIT_DEG" or abs(entry[0] - entry[1]) > 1e-6 * max(1.0, abs(entry[1])):
             values[name], texts[name] = entry[0], entry[2]
     refuse_unknown_parameters(file, autopilot, entries, values)
     return AircraftParameters(values, texts)

@@ -17,6 +17,7 @@ from logs.verdict.findings import (
     LOWEST_POINT_ERROR,
     PITCH_LIMIT_TIME,
     Finding,
+    undecided_findings,
 )
 from logs.verdict.judge_flight import with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
@@ -203,15 +204,18 @@ def find_deciding_parameter(
     This takes up to about twenty flights with the simulated autopilot.  If the flight is too long for so many, only the
     limits of pitch and throttle that it reached are tried, with about five flights each.  For the flight of an
     autopilot program, the result is None unless the simulated autopilot fails, too.
+
+    Findings that are undecided at all values, such as slopes of an uncertain aircraft, do not prevent a value from
+    passing.
     """
-    if setup.autopilot.parameters is None or verdict.flies:
+    if setup.autopilot.parameters is None or not verdict.failed:
         return None
     findings = verdict.findings
     if setup.autopilot.program is not None:
         simulated_verdict = Trial(
             replace(setup, autopilot=setup.autopilot.model), aircraft, should_abort
         ).flight_verdict
-        if simulated_verdict.flies:
+        if not simulated_verdict.failed:
             return None
         findings = simulated_verdict.findings
     # A tried acceptance radius would also change the width of the corridor: keep the width of the failed flight.  A
@@ -222,12 +226,13 @@ def find_deciding_parameter(
     same_setup = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(autopilot: Autopilot) -> bool:
-        """Return True if the flight passes, with margin, with the parameters of an autopilot."""
+        """Return True if a flight with the parameters of an autopilot fails no rule, with margin, to its end."""
         trial_setup = replace(setup, autopilot=autopilot)
         if trial_setup.corridor != setup.corridor:
             trial_setup = replace(same_setup, autopilot=autopilot)
         trial_verdict = Trial(trial_setup, aircraft, should_abort).flight_verdict
-        return trial_verdict.flies and passes_with_margin(trial_verdict.findings, findings)
+        has_passed = trial_verdict.complete and not trial_verdict.failed
+        return has_passed and passes_with_margin(trial_verdict.findings, findings)
 
     is_long = max_explaining_flights(setup) < _MAX_PARAMETER_FLIGHTS
     return find_passing_parameter(setup.autopilot, findings, passes, only_reached_limits=is_long)
@@ -239,15 +244,19 @@ CROSS_TRACK_ERROR_FRACTION = 0.1
 
 
 def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
-    """Return True if the margins of all formerly failed findings allow for simulation errors in a trial.
+    """Return True if no failed finding fails or is undecided in a trial, with the margin that simulation errors need.
 
     trial_findings: findings of a flight with another parameter value.
     failed_findings: findings of the flight that failed.
     Margins are required for the lateral distance from the legs and for the height above ground.
     """
     failed_keys = {(finding.rule, finding.place) for finding in failed_findings if finding.ok is False}
+    undecided_keys = {(finding.rule, finding.place) for finding in undecided_findings(failed_findings)}
     for finding in trial_findings:
-        if (finding.rule, finding.place) not in failed_keys or finding.margin is None:
+        key = finding.rule, finding.place
+        if key in failed_keys - undecided_keys and finding.state == "open":
+            return False
+        if key not in failed_keys or finding.margin is None:
             continue
         required_margins = {
             "corridor": CROSS_TRACK_ERROR_FRACTION * abs(finding.flown or 0.0),
@@ -314,7 +323,8 @@ def explain_verdict(
                 MissionContext.from_setup(setup), judged_mission, should_abort
             ).find_passing()
             reference = replace(reference, tried=tried_suggestions(passed_trials))
-        if reference.airframe is not None and reference.airframe.flyable:
+        # The flight of an aircraft with uncertain limits is undecided, but it fails nothing.
+        if reference.airframe is not None and not reference.airframe.failed:
             deciding = _suggested_parameter(verdict, passed_trials)
             deciding = deciding or find_deciding_parameter(setup, aircraft, verdict, should_abort)
             reference = replace(reference, deciding=deciding)

@@ -357,7 +357,12 @@ class ArduPlane(Autopilot):
             # An RTL that follows the terrain is not simulated.
             unsimulated_text=lambda mission: "terrain" if parameters.rtl_follows_terrain else "",
             unjudged_texts=self._unjudged_rtl_parts,
-            trials=ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb"),
+            trials=ReturnTrials(
+                (altitude,),
+                (*climbs, {"FLIGHT_OPTIONS": options}),
+                "RTL_ALTITUDE, climb",
+                endings=({"RTL_AUTOLAND": 1.0}, {"RTL_AUTOLAND": 3.0}),
+            ),
         )
 
     def _unjudged_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:

@@ -365,6 +365,8 @@ SIDE_CANDIDATES = (
     Candidate("NAV_ACC_RAD", 5.0, 60.0, "m"),
     Candidate("NAV_ACC_RAD", 5.0, 90.0, "m"),
     Candidate("NAV_ACC_RAD", 5.0, 120.0, "m"),
+    # Back to PX4's default.
+    Candidate("NAV_ACC_RAD", 5.0, 10.0, "m"),
     Candidate("NPFG_PERIOD", 1.0, 5.0, "s"),
     Candidate("FW_R_LIM", 1.0, 60.0, "deg", least=35.0),
 )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Camera, Command, Mission
+from flight.mission.items import OVER_HOME, Camera, Command, Mission
 from flight.mission.surveys import LineAxis, PhotoLine, Survey, camera_spacing, survey_plan
 from flight.simulation.track import ROLL, YAW
 from logs.verdict.measures.acceptance import acceptance_limit, position_error
@@ -430,6 +430,9 @@ class OverlapMeasure:
     min_height, max_height: heights above ground of the usable photos, m; NaN if none is usable.
     unusable_fraction, unknown_fraction: fractions of the length of all lines where no overlap is judged, because no
         photo is usable, or because the terrain data do not cover the ground.
+    relief: difference between the highest and the lowest ground below the usable photos, m; 0 unless all lines are
+        planned at one altitude.
+    planned_height: planned height of the lines above the ground, or above home, m; 0 if the mission states none.
     """
 
     camera: Camera
@@ -448,6 +451,28 @@ class OverlapMeasure:
     max_height: float = math.nan
     unusable_fraction: float = 0.0
     unknown_fraction: float = 0.0
+    relief: float = 0.0
+    planned_height: float = 0.0
+
+    @property
+    def is_lost_by_relief(self) -> bool:
+        """True if overlaps are too small because lines at one altitude do not follow the terrain.
+
+        At the planned height, or at the middle of the flown heights, these overlaps would be large enough.
+        """
+        height = self.planned_height or 0.5 * (self.min_height + self.max_height)
+        if not self.relief > PHOTO_HEIGHT_FRACTION * height:
+            return False
+        overlaps = (
+            (self.front, self.camera.front, self.photo_spacing, self.camera.along),
+            (self.side, self.camera.side, self.line_spacing, self.camera.across),
+        )
+        needed_heights = [
+            distance / (width * (1.0 - required + PHOTO_OVERLAP_TOLERANCE))
+            for overlap, required, distance, width in overlaps
+            if overlap is not None and required is not None and overlap < required - PHOTO_OVERLAP_TOLERANCE
+        ]
+        return bool(needed_heights) and max(needed_heights) <= height
 
     @property
     def needed_photo_spacing(self) -> float | None:
@@ -498,6 +523,8 @@ class OverlapMeasure:
         return scale * self.min_height, scale * self.max_height
 
 
+# Largest difference of the planned altitudes of lines at one altitude, m.
+_LEVEL_LINES_M = 1.0
 # Maximum distance of neighbouring lines, in spacings of the survey: one line may be missing between them.
 _MAX_NEIGHBOR_SPACINGS = 2.5
 # Maximum distance of lines at one lateral position, such as the two parts of a line across a notch, in spacings.
@@ -545,14 +572,24 @@ def measure_overlap(
     kept_fractions = [0.0 if strip is None else strip.usable_fraction + strip.unknown_fraction for strip in strips]
     used_heights = [strip.heights[strip.is_usable] for strip in strips if strip is not None]
     heights = np.concatenate(used_heights) if used_heights else np.empty(0)
+    altitudes = np.concatenate([requirements.points[line.first : line.last + 1, 2] for line in survey.lines])
+    start_seq = int(requirements.route.items[first_line.first])
+    heights_above_home = (
+        item.alt for item in requirements.setup.mission.items if item.seq == start_seq and item.frame in OVER_HOME
+    )
     measure = OverlapMeasure(
         plan.camera,
+        planned_height=plan.height or next(heights_above_home, 0.0),
         unusable_fraction=1.0 - float(np.average(kept_fractions, weights=lengths)),
         unknown_fraction=float(np.average(unknown_fractions, weights=lengths)),
     )
     if heights.size:
+        grounds = [(strip.positions[:, 2] - strip.heights)[strip.is_usable] for strip in strips if strip is not None]
+        relief = float(np.ptp(np.concatenate(grounds))) if float(np.ptp(altitudes)) <= _LEVEL_LINES_M else 0.0
         max_crab = max(float(np.abs(strip.crabs[strip.is_usable]).max(initial=0.0)) for strip in strips if strip)
-        measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()), max_crab=max_crab)
+        measure = replace(
+            measure, min_height=float(heights.min()), max_height=float(heights.max()), max_crab=max_crab, relief=relief
+        )
     measure = _with_side_overlap(measure, requirements, survey, kept_strips)
     if measure.side is None:
         # No two sufficiently usable lines are neighbours: use the usable parts of all lines.

@@ -119,6 +119,7 @@ class SimulatedReturn:
     required_height: required height above ground, m; see `required_heights`.
     energy_used: energy used before the return, Wh; NaN if unknown.
     starts_too_low: True if the flight itself is lower than the required height at the start.
+    violation: where and how deep the zone is violated; None without a violated zone.
     """
 
     time: float
@@ -136,11 +137,29 @@ class SimulatedReturn:
     required_height: float = math.nan
     energy_used: float = math.nan
     starts_too_low: bool = False
+    violation: "ZoneViolation | None" = None
 
     @property
     def safe(self) -> bool:
         """True if the outcome of the return is "safe"."""
         return self.kind == "safe"
+
+
+class ZoneViolation(NamedTuple):
+    """Deepest violation of a zone by a return.
+
+    zone: index of the zone in `Returns.airspace`.
+    name: name of the zone.
+    is_inclusion: True for a zone to stay in.
+    depth: depth of the violation, m.
+    position: position of the deepest violation, m east and m north.
+    """
+
+    zone: int
+    name: str
+    is_inclusion: bool
+    depth: float
+    position: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -596,7 +615,8 @@ def judge_returns(
         ]
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
         returns += reported_returns
-    parameters = world.autopilot.parameters
+    parameters, trials = world.autopilot.parameters, world.autopilot.returns.trials
+    ending_names = {name for ending in trials.endings for name in ending if world.ending == "straight to land"}
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
         each=tuple(returns),
@@ -615,7 +635,7 @@ def judge_returns(
         landings=world.landings,
         autopilot=world.autopilot.title,
         path_text=world.autopilot.returns.path_text,
-        trials_text=world.autopilot.returns.trials.text,
+        trials_text=", ".join([*ending_names, trials.text]),
     )
 
 
@@ -747,7 +767,8 @@ def _judge_return(
     path: positions of the return, m, (t, 3); empty without zones.
     required_height: required height above ground, m.
     """
-    zone = most_violated_zone(world, path) if len(path) > 1 else -1
+    violation = deepest_violation(world, path) if len(path) > 1 else None
+    zone = -1 if violation is None else violation.zone
     energy_used = float(starts.energy_used[start_index])
     energy_left = float(world.setup.battery - energy_used - result["energy"]) if world.is_energy_known else math.nan
     row = starts.rows[start_index]
@@ -770,11 +791,12 @@ def _judge_return(
         time_to_loiter=float(result["arrival_time"]),
         required_height=required_height,
         energy_used=energy_used,
+        violation=violation,
     )
 
 
-def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
-    """Return the index of the zone that a path violates most, or -1 if it violates none.
+def deepest_violation(world: ReturnWorld, path: Floats) -> ZoneViolation | None:
+    """Return the deepest violation of a zone by a path, or None if it violates none.
 
     path: positions at intervals of one second, m, (t, 3).
     """
@@ -789,7 +811,16 @@ def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
     moves["time"] = np.arange(len(steps))
     visits = path_zones(moves, world.airspace.records, world.scenario.terrain)
     zone = int(np.argmax(visits["depth"]))
-    return zone if visits[zone]["depth"] > 0.0 else -1
+    visit = visits[zone]
+    if not visit["depth"] > 0.0:
+        return None
+    return ZoneViolation(
+        zone,
+        world.airspace.zones[zone].name,
+        world.airspace.zones[zone].kind == "inclusion",
+        float(visit["depth"]),
+        (float(visit["at_east"]), float(visit["at_north"])),
+    )
 
 
 # ----------------------------------------------------------------------

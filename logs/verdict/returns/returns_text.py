@@ -51,6 +51,8 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "descend below {limit:.0f} m above ground",
 }
+# Largest number of violated zones that a summary names.
+_MAX_NAMED_ZONES = 3
 # Legend text of a path segment from which returns have this outcome.
 _SEGMENT_NAMES: dict[Kind, str] = {
     "ground": "a return hits the ground",
@@ -132,6 +134,10 @@ def outcome_text(ret: SimulatedReturn, limit: float) -> str:
 
     limit: required minimum height above ground, m.
     """
+    if ret.kind == "zone" and ret.violation is not None:
+        side, (east, north) = "outside" if ret.violation.is_inclusion else "inside", ret.violation.position
+        depth_text = quantity_text(ret.violation.depth, "m")
+        return f"is {depth_text} {side} zone {ret.violation.name} at {east:.0f} m east, {north:.0f} m north"
     return "is safe" if ret.safe else _SINGULAR_TEXTS[ret.kind].format(limit=limit)
 
 
@@ -157,11 +163,21 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
 def failure_counts_text(returns: Returns) -> str:
     """State how many returns are not safe, by outcome, the worst first, as "3 hit the ground"; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
-    texts = {
-        kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
-        for kind, count in counts.items()
-    }
+    texts = {kind: _kind_text(returns, kind, is_plural=count != 1) for kind, count in counts.items()}
     return ", ".join(f"{count} {texts[kind]}" for kind, count in counts.items() if count)
+
+
+def _kind_text(returns: Returns, kind: Kind, *, is_plural: bool) -> str:
+    """Return the verb phrase for the returns with an outcome, with the names of the violated zones."""
+    text = (_PLURAL_TEXTS if is_plural else _SINGULAR_TEXTS)[kind].format(limit=returns.limit)
+    names = list(
+        dict.fromkeys(ret.violation.name for ret in returns.each if ret.kind == "zone" and ret.violation is not None)
+    )
+    if kind != "zone" or not names:
+        return text
+    more_text = f" and {len(names) - _MAX_NAMED_ZONES} more" if len(names) > _MAX_NAMED_ZONES else ""
+    noun = "zone" if len(names) == 1 else "zones"
+    return text.replace("a zone", f"{noun} {', '.join(names[:_MAX_NAMED_ZONES])}{more_text}")
 
 
 def returns_headline(returns: Returns) -> str:
@@ -189,11 +205,9 @@ def returns_headline(returns: Returns) -> str:
     incomplete_text = f"not judged in full ({reasons}): " if reasons else ""
     total, failure_counts = len(returns.each), failure_counts_text(returns)
     common_kind = next((kind for kind in KINDS if returns.count(kind) == total), None)
-    subject, verb, texts = (
-        (f"all {total} returns", "are", _PLURAL_TEXTS) if total > 1 else ("the only return", "is", _SINGULAR_TEXTS)
-    )
+    subject, verb = (f"all {total} returns", "are") if total > 1 else ("the only return", "is")
     if failure_counts and common_kind is not None:
-        judged_text = f"{subject} {texts[common_kind].format(limit=returns.limit)}"
+        judged_text = f"{subject} {_kind_text(returns, common_kind, is_plural=total > 1)}"
     elif failure_counts:
         safe_count, (first_count, _, outcomes) = returns.count("safe"), failure_counts.partition(" ")
         safe_text = "none is" if safe_count == 0 else "1 is" if safe_count == 1 else f"{safe_count} are"
@@ -295,7 +309,7 @@ def describe_rtl_ending(returns: Returns) -> list[str]:
         case 1, True:
             text = f"from its loiter a return continues to the landing sequence at {items_text}"
         case 2, True:
-            text = f"a return flies straight to the landing sequence at {items_text}"
+            text = f"a return flies straight to the landing sequence at {items_text}; RTL_ALTITUDE has no effect"
         case 3, _:
             text = f"the landing sequence is for go-arounds only: {loiter_text}"
         case 4, _:
@@ -361,7 +375,7 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
                 f" {scenario.threats.names[worst_return.threat]}"
             )
         case "zone":
-            return f"violates zone {returns.airspace.zones[worst_return.zone].name}"
+            return outcome_text(worst_return, returns.limit)
         case "lost":
             end_text = "landing sequence" if worst_return.target.landing is not None else "loiter"
             return f"does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"

@@ -21,10 +21,10 @@ from logs.verdict.returns.judge_returns import (
     TURN_HEIGHT_LOSS_M,
     Returns,
     ReturnWorld,
+    deepest_violation,
     exclude_approaches,
     flies_landing_approach,
     heights_above_ground,
-    most_violated_zone,
     possible_heights,
     required_heights,
 )
@@ -177,7 +177,7 @@ def _meets_criterion(
         energy_left = world.setup.battery - np.nan_to_num(starts.energy_used) - results["energy"]
         is_met &= ~(energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery)
     for k, path in enumerate(simulated.tracks):
-        is_met[k] = is_met[k] and (len(path) < 2 or most_violated_zone(world, path) < 0)
+        is_met[k] = is_met[k] and (len(path) < 2 or deepest_violation(world, path) is None)
     return is_met
 
 
@@ -207,11 +207,26 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     Up to two heights are suggested: the lowest with which all returns clear the ground, and the lowest with which all
     are safe.  Return [] if the returns already keep all limits with the present parameters.
     Heights are tried one by one, because a higher return may lead through a sphere and need not be safer.
+
+    If the returns fly straight to a landing sequence, where the RTL altitude has no effect, other endings of the return
+    are suggested, alone or with the changes that they need.
     """
     limits = _return_limits(world, starts)
     trial = _ReturnTrial(starts, limits)
     if trial.passes(world, _meets_all_limits):
         return []
+    endings = world.autopilot.returns.trials.endings
+    if world.ending == "straight to land" and endings:
+        passing_ending = first_that_passes(
+            endings, lambda ending: trial.passes(world.with_parameters(**ending), _meets_all_limits)
+        )
+        if passing_ending is not None:
+            return [Remedy(dict(passing_ending))]
+        return [
+            Remedy({**ending, **remedy.parameters})
+            for ending in endings
+            for remedy in suggest_parameters(world.with_parameters(**ending), starts)
+        ]
     remedies: list[Remedy] = []
     lowest_values: dict[str, float] = {}
     for present_values in world.autopilot.returns.trials.altitudes:

@@ -10,6 +10,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, project_onto_leg
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
+from logs.verdict.wording import compared_texts
 
 
 def corridor_findings(
@@ -37,9 +38,8 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         ok = planned_distance <= limit + ROUNDING_M
         facts.append(f"its turns are planned within {planned_distance:.1f} m of the legs")
         if not ok:
-            faults.append(
-                message(f"its turns lead {planned_distance:.0f} m off the legs", f"; the corridor allows {limit:.0f} m")
-            )
+            off_text, max_text = compared_texts(planned_distance, limit, "m", 0)
+            faults.append(message(f"its turns lead {off_text} off the legs", f"; the corridor allows {max_text}"))
     elif aligned is None or not aligned.has_flown(leg):
         facts.append("the leg was not flown")
     else:
@@ -64,9 +64,8 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         time_and_place = f"at {aligned.track.time[farthest_row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
         facts.append(f"within {flown_distance:.1f} m of the legs, the farthest {time_and_place}")
         if not ok:
-            faults.append(
-                message(f"{flown_distance:.0f} m off the legs {time_and_place}", f"; the corridor allows {limit:.0f} m")
-            )
+            off_text, max_text = compared_texts(flown_distance, limit, "m", 0)
+            faults.append(message(f"{off_text} off the legs {time_and_place}", f"; the corridor allows {max_text}"))
     return make_finding(
         "corridor",
         requirements.leg_place(leg),

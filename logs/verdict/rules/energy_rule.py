@@ -35,7 +35,7 @@ from logs.verdict.tolerances import (
     NOMINAL_CELL_VOLTAGE_V,
     UNDECIDED_FRACTION,
 )
-from logs.verdict.wording import count_text, quantity_text
+from logs.verdict.wording import compared_texts, count_text, quantity_text
 from world.errors import PlanflyError
 
 _MAH_PER_AH = 1000.0
@@ -236,12 +236,13 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
             else:
                 unjudged.append(name)
         elif charge_used > failsafe.used_charge:
-            limit_text = f"the failsafe {name} acts after {max(0.0, failsafe.used_charge):.0f} mAh"
+            used_text, charge_text = compared_texts(max(0.0, failsafe.used_charge), charge_used, "mAh", 0)
+            limit_text = f"the failsafe {name} acts after {used_text}"
             if failsafe.shares_charge:
-                share_text = f" from one battery; the flight needs {charge_used:.0f} mAh from several batteries"
+                share_text = f" from one battery; the flight needs {charge_text} from several batteries"
                 messages.undecided.append(message(f"{limit_text}{share_text}"))
             else:
-                messages.faults.append(message(f"{limit_text}, but the flight needs {charge_used:.0f} mAh"))
+                messages.faults.append(message(f"{limit_text}, but the flight needs {charge_text}"))
     return_failsafe = setup.autopilot.checks.return_time_failsafe
     if return_failsafe is not None:
         # The battery's remaining time may trigger an early return.  It is shortest at the end of the mission, and is

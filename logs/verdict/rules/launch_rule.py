@@ -26,7 +26,7 @@ from logs.verdict.tolerances import (
     MAX_LAUNCH_HEIGHT_LOSS_M,
     RUNWAY_MARGIN_M,
 )
-from logs.verdict.wording import gentle_launch_text
+from logs.verdict.wording import compared_texts, gentle_launch_text
 from world.arrays import Floats
 from world.terrain import Terrain
 
@@ -57,7 +57,8 @@ def launch_findings(
     if height_lost > MAX_LAUNCH_HEIGHT_LOSS_M:
         faults.append(
             message(
-                f"sinks {height_lost:.1f} m after the launch", f"; at most {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed"
+                f"sinks {compared_texts(height_lost, MAX_LAUNCH_HEIGHT_LOSS_M, 'm', 1)[0]} after the launch",
+                f"; at most {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed",
             )
         )
     # Runway left at the aircraft's last contact with it.

@@ -37,7 +37,7 @@ from logs.verdict.tolerances import (
     LOITER_WIDENING_FRACTION,
     WAYPOINT_PASS_MARGIN_M,
 )
-from logs.verdict.wording import place_text
+from logs.verdict.wording import compared_texts, place_text
 from world.arrays import Floats
 from world.geometry import tangent_length
 
@@ -212,10 +212,11 @@ def _loiter_finding(
     mean_radius = float(radii.mean()) if radii.size else math.nan
     max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
     if rules.steers_to_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
-        faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
+        mean_text, max_text = compared_texts(mean_radius, max_radius, "m", 0)
+        faults.append(message(f"flown with a mean radius of {mean_text}", f"; at most {max_text}"))
     ok: bool | None = not (faults or failed_corners)
     if radii.size:
-        laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
+        laps_text = "" if math.isnan(laps) else f"{laps:.1f} laps "
         facts.append(f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center")
     has_unjudged = any(finding.ok is None and finding.check != UNKNOWN_AIRCRAFT for finding in corner_findings)
     # A loiter that ends at an altitude needs no number of laps.
@@ -279,17 +280,18 @@ def _judge_radius(
     setup, max_bank = requirements.setup, requirements.limits.max_bank
     is_known = bool(np.isfinite(requirements.turn_limit[circle.first : circle.last + 1]).all())
     min_radius = _min_radius(requirements, circle) if is_known else math.nan
-    loiter, laps_text = _stated_loiter(requirements, circle), f"{circle.laps:.2f} laps from joining to leaving"
+    loiter, laps_text = _stated_loiter(requirements, circle), f"{circle.laps:.1f} laps from joining to leaving"
     if loiter is not None and loiter.turns:
         laps_text = f"{loiter.turns:g} {'lap' if loiter.turns == 1.0 else 'laps'} planned ({laps_text})"
     facts = [f"{laps_text}, with a radius of {circle.radius:.0f} m"]
     if not is_known or circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return _RadiusJudgement(min_radius, [], facts, "", "")
     speed = float(requirements.route.leg_airspeeds[circle.first])
-    need_text = f"at {speed:.0f} m/s and {bank_limit_text(setup)} the aircraft needs {min_radius:.0f} m"
+    radius_text, min_text = compared_texts(circle.radius, min_radius, "m", 0)
+    need_text = f"at {speed:.0f} m/s and {bank_limit_text(setup)} the aircraft needs {min_text}"
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"
-    fault = message(f"the radius is {circle.radius:.0f} m, but {need_text} in this wind")
+    fault = message(f"the radius is {radius_text}, but {need_text} in this wind")
     # The largest bank limit that the aircraft may have permits the radius.
     if circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M:
         return _RadiusJudgement(min_radius, [], [fault.text, *facts], UNKNOWN_AIRCRAFT, "")

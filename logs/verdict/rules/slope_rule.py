@@ -43,7 +43,7 @@ from logs.verdict.tolerances import (
     SPEED_TOLERANCE_MPS,
     UNDECIDED_FRACTION,
 )
-from logs.verdict.wording import place_text
+from logs.verdict.wording import compared_texts, place_text
 from world.wind import W20
 
 
@@ -405,10 +405,11 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     first, second = requirements.leg_place(leg).number, requirements.leg_place(corner).number
-    arc_text = f"the arc at {place_text(place)} {verb} at {slope:.1f}° for {length:.0f} m"
+    slope_text, limit_text = compared_texts(slope, math.degrees(math.atan(arc.limit)), "deg", 1)
+    arc_text = f"the arc at {place_text(place)} {verb} at {slope_text} for {length:.0f} m"
     side = "below" if arc.tangent > 0.0 else "above"
     limit = (
-        f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, and would end"
+        f"; the aircraft can fly at most {limit_text} there, and would end"
         f" {arc.missing_height:.0f} m {side} the arc's end; the arc is steeper than legs {first} and {second}"
         f" ({slopes}), because it replaces {2.0 * float(requirements.length_before[corner]):.0f} m of leg"
     )
@@ -525,8 +526,8 @@ def _flown_faults(
     if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
         side = "above" if measure.height_error > 0.0 else "below"
         line = "its height above ground" if follows_ground(requirements, leg) else "the leg"
-        limit_text = f" (at most {_height_error_limit(measure):.0f} m)"
-        faults["height"] = message(f"{abs(measure.height_error):.0f} m {side} {line}", limit_text)
+        error_text, max_text = compared_texts(abs(measure.height_error), _height_error_limit(measure), "m", 0)
+        faults["height"] = message(f"{error_text} {side} {line}", f" (at most {max_text})")
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
@@ -537,8 +538,9 @@ def _flown_faults(
             and not (has_ability and name == _throttle_limit(planned_slope))
         ):
             throttle_text = _throttle_text(requirements, name)
-            brief = f"{throttle_text} for {duration:.0f} s and {error:.1f} m/s too {direction}"
-            faults[name] = message(brief, f" (at most {max_error:.1f} m/s)")
+            error_text, max_text = compared_texts(error, max_error, "m/s", 1)
+            brief = f"{throttle_text} for {duration:.0f} s and {error_text} too {direction}"
+            faults[name] = message(brief, f" (at most {max_text})")
     return faults
 
 

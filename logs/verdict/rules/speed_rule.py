@@ -37,6 +37,7 @@ from logs.verdict.tolerances import (
     SATURATED_TIME_S,
     SLOPE_CHANGE_LAG_M,
 )
+from logs.verdict.wording import compared_texts
 from world.arrays import Floats
 from world.wind import W20
 
@@ -290,16 +291,12 @@ def _level_speed_range(
     if math.isnan(min_speed) or math.isnan(max_speed):
         faults.append(message(f"the aircraft cannot fly level at {max_altitude:.0f} m AMSL"))
     if commanded < min_speed:
-        slow_text = (
-            f"{commanded:.1f} m/s TAS is below the minimum level speed, {min_speed:.1f} m/s TAS at"
-            f" {max_altitude:.0f} m AMSL"
-        )
+        speed_text, limit_text = compared_texts(commanded, min_speed, "m/s", 1)
+        slow_text = f"{speed_text} TAS is below the minimum level speed, {limit_text} TAS at {max_altitude:.0f} m AMSL"
         faults.append(message(slow_text))
     if commanded > max_speed:
-        fast_text = (
-            f"{commanded:.1f} m/s TAS is above the maximum level speed, {max_speed:.1f} m/s TAS at"
-            f" {max_altitude:.0f} m AMSL"
-        )
+        speed_text, limit_text = compared_texts(commanded, max_speed, "m/s", 1)
+        fast_text = f"{speed_text} TAS is above the maximum level speed, {limit_text} TAS at {max_altitude:.0f} m AMSL"
         faults.append(message(fast_text))
     return min_speed, max_speed, faults
 

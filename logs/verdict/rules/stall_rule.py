@@ -22,6 +22,7 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_flying_faster
 from logs.verdict.tolerances import GUST_SPEED_FRACTION, STALL_AVERAGING_TIME_S, STALL_TOLERANCE_MPS
+from logs.verdict.wording import compared_texts
 from world.arrays import Floats
 from world.wind import W20
 
@@ -144,8 +145,9 @@ def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *
     time_or_place_text: text on the time or place of the margin, such as "at waypoint 3".
     tolerance: accepted deficit of airspeed, m/s.
     """
+    speed_text, limit_text = compared_texts(margin.speed, margin.stall_speed, "m/s", 1)
     stall_text = (
-        f"airspeed {margin.speed:.1f} m/s {time_or_place_text}; the stall speed is {margin.stall_speed:.1f} m/s in"
+        f"airspeed {speed_text} {time_or_place_text}; the stall speed is {limit_text} in"
         f" {math.degrees(margin.bank):.0f}° of bank"
     )
     fault = message(stall_text, f" and {margin.level_stall_speed:.1f} m/s in level flight (true airspeeds)")

@@ -100,6 +100,8 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
         is_unknown = check == SIDE_OVERLAP and measure.is_side_unknown
         ok = None if is_unknown else overlap >= limit
         faults = [] if ok else [message(crab_text(measure), f"; {text}") if is_unknown else message(text)]
+        if ok is False and measure.is_lost_by_relief:
+            faults = [message(text, f"; {relief_text(measure)}")]
         findings.append(
             make_finding(
                 "survey",
@@ -147,6 +149,16 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     gap_text = f", with a gap of {gap:.0f} m between the photos" if gap >= _MIN_STATED_GAP_M else ""
     text = f"lowest {check} {100.0 * overlap:.0f} %{gap_text} ({lines_text})"
     return text if required is None else f"{text}; {100.0 * required:.0f} % is required"
+
+
+def relief_text(measure: OverlapMeasure) -> str:
+    """Describe why photos overlap too little on lines at one altitude above sloping ground, and the remedy."""
+    planned_text = f", planned {measure.planned_height:.0f} m" if measure.planned_height else ""
+    return (
+        "the lines are at one altitude and do not follow the terrain: their height above ground ranges from"
+        f" {measure.min_height:.0f} to {measure.max_height:.0f} m{planned_text}; lines that follow the terrain keep the"
+        " overlap (FollowTerrain of QGroundControl's survey; for ArduPlane also altitude frame 10)"
+    )
 
 
 def crab_text(measure: OverlapMeasure) -> str:

@@ -18,7 +18,7 @@ from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_gentler_landing
 from logs.verdict.tolerances import LEVEL_SLOPE_RAD, PLAN_TOLERANCE_RAD
-from logs.verdict.wording import gentle_launch_text, place_text
+from logs.verdict.wording import compared_texts, gentle_launch_text, place_text
 
 # Verb, by rule, for the text that a flight begins or ends in the air if the phase is not flown.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
@@ -160,7 +160,8 @@ def _slope_finding(
     )
     limit_deg = math.degrees(limit.limit)
     verb = "climbs" if slope >= 0.0 else "sinks"
-    text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
+    slope_text, limit_text = compared_texts(math.degrees(abs(slope)), limit_deg, "deg", 1)
+    text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {slope_text}"
     ok: bool | None = True
     check, faults = "", list[Message]()
     ground_phases = requirements.setup.ground_phases
@@ -168,7 +169,7 @@ def _slope_finding(
     if abs(slope) > limit.limit + PLAN_TOLERANCE_RAD:
         ok = _RESULT_BEYOND_LIMIT[rule]
         check = GROUND_PATH if ok is None else ""
-        limit_text = f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
+        limit_text = f"; at most {limit_text} can be flown at {limit.airspeed:.1f} m/s and in this wind"
         if is_flown and rule == "landing":
             limit_text += " without gaining speed; a flight judges its touchdown instead"
         faults, reason = [message(f"the {_PHASE_TITLES[rule]} {text}", limit_text)], text + limit_text

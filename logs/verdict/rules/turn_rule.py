@@ -28,7 +28,7 @@ from logs.verdict.tolerances import (
     SETTLED_CROSS_TRACK_M,
     STRAIGHT_RADIUS_RATIO,
 )
-from logs.verdict.wording import count_text, place_text
+from logs.verdict.wording import compared_texts, count_text, place_text
 from world.geometry import fly_by_offset
 
 
@@ -137,8 +137,9 @@ def _judge_planned_turn(
     source: source of the limit: "scenario" or "aircraft".
     """
     turn = abs(float(requirements.turns[waypoint]))
-    turn_text = f"turns {math.degrees(turn):.1f}°"
-    facts = [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
+    angle_text, limit_text = compared_texts(math.degrees(turn), math.degrees(limit), "deg", 1)
+    turn_text = f"turns {angle_text}"
+    facts = [turn_text + (f" (at most {limit_text})" if math.isfinite(limit) else "")]
     if turn <= limit + PLAN_TOLERANCE_RAD:
         return [], facts, "", turn
     lateral = negligible_kink_distance(requirements, waypoint)
@@ -261,13 +262,14 @@ def _flown_faults(
             )
     if measure.get("overshoot", 0.0) > OVERSHOOT_TOLERANCE_M:
         passed_text = "its next leg" if "pass time" in measure else "its arc"
+        overshoot_text, _ = compared_texts(measure["overshoot"], OVERSHOOT_TOLERANCE_M, "m", 0)
         faults["overshoot"] = message(
-            f"overshoots {passed_text} by {measure['overshoot']:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
+            f"overshoots {passed_text} by {overshoot_text}", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
         )
     max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[setup.scenario.wind.turbulence]
     if measure.get("complete") and measure.get("settled", 0.0) > max_offset:
-        offset_text = f"still {measure['settled']:.1f} m off the next leg at its end"
-        faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
+        offset_text, max_text = compared_texts(measure["settled"], max_offset, "m", 1)
+        faults["settled"] = message(f"still {offset_text} off the next leg at its end", f" (at most {max_text})")
     if measure.get("circles"):
         faults["circles"] = message(f"{count_text(int(measure['circles']), 'full circle')} flown at the corner")
     return faults

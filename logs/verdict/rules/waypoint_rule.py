@@ -19,7 +19,7 @@ from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circle
 from logs.verdict.rule import Rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import CORNER_CUT_TOLERANCE_M, EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
-from logs.verdict.wording import place_text
+from logs.verdict.wording import compared_texts, place_text
 from world.arrays import Floats
 
 
@@ -64,11 +64,12 @@ def _planned_finding(requirements: RouteRequirements, waypoint: int) -> Finding:
         )
     elif offset > limit + ROUNDING_M:
         turn = math.degrees(abs(float(requirements.turns[waypoint])))
+        offset_text, limit_text = compared_texts(offset, limit, "m", 0)
         radius = float(requirements.radius[waypoint])
         faults.append(
             message(
-                f"the arc of the {turn:.0f}° corner passes the waypoint {offset:.0f} m away",
-                f" (radius {radius:.0f} m); the waypoint counts as reached within {limit:.0f} m",
+                f"the arc of the {turn:.0f}° corner passes the waypoint {offset_text} away",
+                f" (radius {radius:.0f} m); the waypoint counts as reached within {limit_text}",
             )
         )
     return make_finding(

@@ -64,9 +64,11 @@ def trigger(number: int, metres: float) -> dict[str, Any]:
     return simple(number, 0.0) | {"command": 206, "frame": 2, "params": [metres, 0, 1, 0, 0, 0, 0]}
 
 
-def plan_of_survey(calc: dict[str, Any], beyond: Any = 30, metres: float = 15.425000190734863) -> Mission:
+def plan_of_survey(
+    calc: dict[str, Any], beyond: Any = 30, metres: float = 15.425000190734863, *, follows: bool = False
+) -> Mission:
     held = [simple(1, 36.5), trigger(2, metres), simple(3, 36.51), trigger(4, 0.0)]
-    transects = {"Items": held, "CameraCalc": calc, "TurnAroundDistance": beyond}
+    transects = {"Items": held, "CameraCalc": calc, "TurnAroundDistance": beyond, "FollowTerrain": follows}
     survey = {"type": "ComplexItem", "complexItemType": "survey", "TransectStyleComplexItem": transects}
     return parse_mission(plan_with(survey), "a.plan")
 
@@ -83,6 +85,9 @@ def test_the_camera_of_a_survey_is_read() -> None:
     pixels = CALC["ImageWidth"], CALC["ImageHeight"]
     assert (plan.camera.pixels_across, plan.stated_photo) == (pixels[0], CALC["AdjustedFootprintFrontal"])
     assert turned.camera == Camera(plan.camera.along, plan.camera.across, 0.7, 0.7, 1.5, pixels[1])
+    assert plan.height == 50.0
+    # Lines that follow the terrain have no height above home.
+    assert plan_of_survey(CALC, follows=True).survey_plans[0].height == 0.0
     # Without pixels the sensor's own sides.
     [plain] = plan_of_survey({key: value for key, value in CALC.items() if not key.startswith("Image")}).survey_plans
     assert plain.camera == Camera(6.17 / 4.5, 4.55 / 4.5, 0.7, 0.7)

@@ -45,7 +45,7 @@ def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
 
 def test_what_is_kept_of_surveys_comes_back() -> None:
     plans = (
-        SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0, 6000.0), 24.0),
+        SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0, 6000.0), 24.0, 120.0),
         SurveyPlan(None),
         SurveyPlan(0.0, 10.0),
     )
@@ -59,6 +59,7 @@ def test_what_is_kept_of_surveys_comes_back() -> None:
             "pixels_across": 6000.0,
         },
         "stated_photo_m": 24.0,
+        "height_m": 120.0,
     }
     same(MissionTable.model_validate(table).mission(), with_surveys)
     # A log of before there were any, and of a mission without a survey, says nothing of them.

@@ -12,6 +12,8 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
@@ -115,6 +117,16 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert undecided.lines[1].endswith(
         "cannot: no parameter value that was tried lets the flight pass with a margin for simulation errors"
     )
+
+
+def test_a_mission_that_the_autopilot_rejects_needs_no_other_parameters() -> None:
+    """PX4 supports no DO_SET_SERVO in missions, whatever its parameters are."""
+    servo = "2 183 5 1500 0 0 0 0 0"
+    setup = setup_of(wp(0, 500), wp(0, 3500), servo, wp(3000, 3500), home="36.5 -84.2 300")
+    refused = replace(setup, autopilot=Px4(Px4Parameters.defaults()))
+    verdict = judge_flight(refused, fly_path(refused), "completed", reference=ReferenceFlights(PASSED))
+    assert verdict.lines[0].startswith("not flyable: mission item 3")
+    assert verdict.lines[1] == "The aircraft can fly this mission, but PX4 cannot: it rejects an item of the mission"
 
 
 @pytest.mark.parametrize(

@@ -52,9 +52,9 @@ def made_row(base: CampaignBase) -> FlightRow:
 
 def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoal]], tmp_path: Path) -> None:
     out = tmp_path / "out"
-    found = planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, flights=99, seed=2, out=out)
+    found = planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, flights=199, seed=2, out=out)
     ((base, goal),) = asked
-    assert goal == WindsGoal(0.9, 0.95, 4, 15.0, 99)
+    assert goal == WindsGoal(0.9, 0.95, 4, 15.0, 199)
     assert base.seed == 2
     assert not {"wind_speed", "wind_from"} & {one.quantity.name for one in base.dispersions.varying}
     names = ["plan.json", "winds.html", "winds.json", "winds.png", "winds.sqlite"]
@@ -68,6 +68,16 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
     assert len(table(out / "winds.sqlite")) == 1
     with pytest.raises(planfly.PlanflyError, match="directions 8: the campaign in this file has 4"):
         planfly.winds("paper-07", prove=0.9, directions=8, most=15.0, seed=2, out=out, resume=True)
+
+
+def test_too_few_flights_for_all_directions_are_stated_at_once(
+    asked: list[tuple[CampaignBase, WindsGoal]], caplog: pytest.LogCaptureFixture
+) -> None:
+    text = "cannot judge all 4 directions; that needs at least 600 flights"
+    for flights, is_warned in ((150, True), (599, True), (600, False)):
+        planfly.winds("paper-07", directions=4, flights=flights)
+        assert (f"warning: {flights} flights {text}" in caplog.text) is is_warned
+    assert len(asked) == 3
 
 
 def test_nothing_to_go_on_with(asked: list[object], tmp_path: Path) -> None:
@@ -89,6 +99,8 @@ def test_nothing_to_go_on_with(asked: list[object], tmp_path: Path) -> None:
         {"most": 0.9},
         {"most": 41.0},
         {"flights": 0},
+        # No direction is judged by fewer than 150 flights.
+        {"flights": 149},
     ],
 )
 def test_numbers_that_are_none_are_refused(bad: dict[str, Any], asked: list[object]) -> None:

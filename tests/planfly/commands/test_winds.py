@@ -15,7 +15,7 @@ import pytest
 from aircraft.data_sheet import DataSheet
 from aircraft.uncertainty import draws_text, read_draws
 from planfly.api import campaigns
-from planfly.campaigns import report
+from planfly.campaigns import find_winds, report
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.tables import WINDS_DATABASE, RequestedFlight, WindsStore
@@ -51,8 +51,9 @@ def flown_here() -> Iterator[None]:
 
 @pytest.mark.usefixtures("flown_here", "undrawn")
 def test_a_short_mission_has_its_chart_stopped_or_not(
-    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(find_winds, "MIN_FLIGHTS_PER_DIRECTION", 8)
     out = tmp_path / "out"
     answer = answered(capsys, 3, *line, "--flights", "8", "--out", str(out))
     assert {path.name for path in out.iterdir()} == {"winds.html", "winds.json", "winds.png", WINDS_DATABASE}
@@ -140,6 +141,7 @@ def test_winds_fly_the_draws_of_an_aircraft(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The whole of it: another aircraft each flight, by its seed, in place of factors on drag and control power."""
+    monkeypatch.setattr(find_winds, "MIN_FLIGHTS_PER_DIRECTION", 4)
     monkeypatch.chdir(tmp_path)
     made = make_data_sheet_folder(tmp_path / "foam", DataSheet(2.1, 1.6, 15.0, 10.0))
     rows = [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{46.0 + 0.002 * k:.6f}\t8.0\t500.0\t1" for k in range(3)]

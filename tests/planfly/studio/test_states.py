@@ -1,14 +1,21 @@
 """States on the page: near a limit, if little of what the limit allows is left or a missile is close."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Frame, Mission, MissionItem
 from logs.verdict.findings import make_finding
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Place
 from logs.verdict.presentation import FindingRow
 from planfly.studio.states import place_states
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
+from tests.synthetic import fly_path, make_setup
 from world.frames import to_geo
 
 
@@ -47,6 +54,18 @@ def test_a_limit_of_zero_leaves_the_scale_of_its_rule() -> None:
         found = FindingRow(finding).place_state
         assert found is not None
         assert found.state == state
+
+
+def test_a_waypoint_that_is_flown_straight_through_is_near_no_limit() -> None:
+    """ArduPlane's acceptance radius shrinks with the turn, to 0 without one."""
+    straight = [[0, 0, 500], [0, 1000, 500], [0, 2000, 500]]
+    setup = replace(make_setup(straight), autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    for aside in (0.0, 0.4):
+        track = fly_path(setup, across=lambda s, aside=aside: np.full_like(s, aside))
+        verdict = judge_flight(setup, track, "completed")
+        passed = next(one for one in verdict.findings if one.rule == "waypoint" and one.place.index == 1)
+        assert passed.state == "ok"
+        assert place_states(route_requirements(setup), verdict.findings).corners[1].state == "ok"
 
 
 @pytest.mark.parametrize(

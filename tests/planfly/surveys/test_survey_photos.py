@@ -102,6 +102,22 @@ def test_a_camera_that_cannot_follow_and_settings_that_contradict_the_items_are_
 
 
 @pytest.mark.parametrize(
+    ("height", "is_noted"), [(0.0, False), (99.0, False), (101.0, False), (97.0, True), (50.0, True)]
+)
+def test_a_height_of_the_camera_that_contradicts_the_items_is_noted(
+    tmp_path: Path, height: float, is_noted: bool
+) -> None:
+    """All items are 100 m above home; 2 % are rounding."""
+    setup = setup_with(tmp_path, survey_of(25.0, height=height))
+    notes = camera_notes(setup.mission, setup.route, Wind(0.0, 0.0), setup.autopilot.speeds.true_airspeed_factor)
+    text = (
+        f"the camera's settings of a survey in the file state a height of {height:g} m (DistanceToSurface), but its"
+        " items state 100 m"
+    )
+    assert notes == ((text,) if is_noted else ())
+
+
+@pytest.mark.parametrize(
     ("changes", "height"),
     [
         ({"front": 0.2, "photo_spacing": 39.0, "height": 50.0}, 110.0),

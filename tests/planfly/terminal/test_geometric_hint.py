@@ -6,7 +6,7 @@ import pytest
 
 from logs.verdict.findings import make_finding
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, Place
 from logs.verdict.verdict import Verdict
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, judge
@@ -43,6 +43,14 @@ def test_the_hint_of_a_flight(geometry: LevelAnswer, suggests: bool, expected: l
     assert any(finding.suggestions for finding in verdict.failed)
     assert not any(FLOWN_TEXT in text for text in texts(replace(verdict, levels=(FAILS,)), suggests=True))
     assert texts(replace(without_suggestions(verdict), levels=(geometry,)), suggests=suggests) == expected
+
+
+def test_a_parameter_that_decides_is_a_remedy() -> None:
+    setup = make_setup(ROUTE, limits={"max_turn_deg": 60.0})
+    verdict = replace(without_suggestions(judge(setup, fly_path(setup))), levels=(FAILS,))
+    finding = verdict.failed[0]
+    deciding = DecidingParameter("NAV_ACC_RAD", 90.0, 40.0, "m", finding.rule, finding.place)
+    assert texts(replace(verdict, deciding=deciding), suggests=False) == []
 
 
 def test_a_verdict_by_geometry_refers_neither_to_flights_nor_to_itself() -> None:

@@ -111,7 +111,12 @@ def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.C
         "  failed  slope: 9 of 10 places fail; the worst is at leg 8: leg 8 climbs at 17°; the aircraft's limit is 8°"
     )
     assert lines[2].endswith("would pass: lengthen leg 8 from 300 m to 400 m")
-    assert lines[3] == (
+    # The suggestions of the five worst places, each with its place.
+    assert [line.split("would pass: ")[1] for line in lines[3:8]] == [
+        *(f"at leg {leg}: lengthen leg {leg} from 300 m to 400 m" for leg in (7, 6, 5, 4)),
+        "and 4 more, in --json",
+    ]
+    assert lines[8] == (
         "          also at leg 7: 16°; leg 6: 15°; leg 5: 14°; leg 4: 13°; leg 3: 12°; leg 2: 11°; 2 more"
     )
     assert not any(line.startswith("  failed") for line in lines[2:])
@@ -200,3 +205,10 @@ def test_a_mission_without_a_home_has_no_line_on_returns(capsys: pytest.CaptureF
     verdict = Verdict((), flyable=True, complete=True, lines=("flyable",), level="geometric")
     print(*verdict_lines(verdict, [], returns=ReturnSummary()), sep="\n")
     assert "returns" not in capsys.readouterr().out
+
+
+def test_a_suggestion_of_several_findings_is_stated_once(capsys: pytest.CaptureFixture[str]) -> None:
+    suggestions = slope(8, 17.0, 8.0).suggestions
+    findings = tuple(replace(slope(k, 9.0 + k, 8.0), suggestions=suggestions) for k in range(9))
+    lines = printed(capsys, Verdict(findings, False, True, ("not flyable",), "flown"))
+    assert [line for line in lines if "would pass" in line] == [lines[2]]

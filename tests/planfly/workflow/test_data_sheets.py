@@ -178,7 +178,7 @@ def test_parameters_are_data(tmp_path: Path) -> None:
 
 
 def test_parameters_of_px4_are_the_same_data_by_its_own_names(tmp_path: Path) -> None:
-    """FW_AIRSPD_TRIM 15 and FW_R_LIM 50 are PX4's own values and say nothing; its stall speed is stated as such."""
+    """FW_AIRSPD_TRIM 15 is PX4's own value and says nothing; its stall speed and FW_R_LIM 50 are stated as such."""
     file = tmp_path / "mine.params"
     lines = ("FW_AIRSPD_TRIM 16", "FW_AIRSPD_MIN 13", "FW_AIRSPD_STALL 10", "FW_T_CLMB_MAX 4", "FW_R_LIM 40")
     file.write_text("".join(f"1\t1\t{line.replace(' ', chr(9))}\t9\n" for line in lines), encoding="ascii")
@@ -196,7 +196,18 @@ def test_parameters_of_px4_are_the_same_data_by_its_own_names(tmp_path: Path) ->
     assert math.degrees(made.max_bank) == pytest.approx(40.0)
     assert "From the parameter file: FW_AIRSPD_TRIM 16, " in (made.folder / "README.md").read_text()
     file.write_text("1\t1\tFW_AIRSPD_TRIM\t15\t9\n1\t1\tFW_R_LIM\t50\t9\n", encoding="ascii")
-    assert read_aircraft_parameters(file).values == {}
+    assert read_aircraft_parameters(file).values == {"ROLL_LIMIT_DEG": 50.0}
+
+
+def test_a_bank_limit_at_the_default_is_stated(tmp_path: Path) -> None:
+    """ArduPlane's default is 45 degrees."""
+    file = tmp_path / "mine.parm"
+    file.write_text("ROLL_LIMIT_DEG 45\nTECS_CLMB_MAX 5\n", encoding="ascii")
+    assert read_aircraft_parameters(file).values == {"ROLL_LIMIT_DEG": 45.0}
+    made = make_data_sheet_folder(tmp_path / "mine", FOAM, file)
+    assert math.degrees(made.max_bank) == pytest.approx(45.0)
+    assert "bank_guessed" not in (made.folder / "uncertainty.toml").read_text()
+    assert "From the parameter file: ROLL_LIMIT_DEG 45.\n" in (made.folder / "README.md").read_text()
 
 
 def test_a_parameter_file_of_no_aeroplane_is_refused(tmp_path: Path) -> None:

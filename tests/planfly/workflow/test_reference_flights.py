@@ -18,7 +18,14 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
-from logs.verdict.findings import LOWEST_POINT_ERROR, PITCH_LIMIT_TIME, Fact, Finding, make_finding
+from logs.verdict.findings import (
+    LOWEST_POINT_ERROR,
+    PITCH_LIMIT_TIME,
+    UNKNOWN_AIRCRAFT,
+    Fact,
+    Finding,
+    make_finding,
+)
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place, ReferenceFlights
@@ -370,6 +377,32 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[FlownMission, Path])
         "aircraft is "
     )
     assert second.endswith(f"m too low on leg 1 (to item 2); with {deciding.passing:g} s the flight would pass")
+
+
+def test_undecided_slopes_do_not_hide_the_parameter_that_decides() -> None:
+    """The aircraft's steepest climb is uncertain by 7 degrees, so that the climb of 5.7 degrees is undecided."""
+    certain = over_a_hill(4.7)
+    envelope = replace(certain.envelope, source="a data sheet", climb_sd=math.radians(7.0))
+    judged = fly_and_judge(replace(certain, limits=replace(certain.limits, envelope=envelope)))
+    assert judged.reference is not None
+    assert judged.reference.airframe is not None
+    assert (judged.reference.airframe.flyable, judged.reference.airframe.failed) == (False, ())
+    assert "slope" in {finding.rule for finding in judged.verdict.undecided_findings}
+    deciding = judged.verdict.deciding
+    assert deciding is not None
+    assert deciding.name == "TECS_HDEM_TCONST"
+    assert judged.verdict.lines[1] == f"A parameter decides: {deciding_text(deciding)}, as far as it can be judged"
+    # A trial in which the failed finding is undecided proves nothing.
+    open_clearance = make_finding("clearance", LEG, ok=None, reason="", check=UNKNOWN_AIRCRAFT)
+    assert not passes_with_margin((open_clearance,), (LOW,))
+    assert passes_with_margin((open_clearance,), (LOW, open_clearance))
+
+
+def test_px4s_acceptance_radius_is_tried_down_to_its_default() -> None:
+    law = Px4(Px4Parameters.defaults("1.17")).with_parameters(NAV_ACC_RAD=90.0)
+    found = find_passing_parameter(law, (WIDE,), lambda other: other.parameters["NAV_ACC_RAD"] < 42.0)
+    assert found is not None
+    assert (found.name, found.current, found.passing) == ("NAV_ACC_RAD", 90.0, 40.0)
 
 
 def test_a_served_flight_tells_stations_which_parameter_decides(

@@ -27,7 +27,7 @@ from logs.verdict.returns.judge_returns import (
     worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, _ground_phase_starts, planned_starts
-from logs.verdict.returns.returns_text import return_range_text, returns_headline
+from logs.verdict.returns.returns_text import measured_text, outcome_text, return_range_text, returns_headline
 from planfly.api.returning import ReturnsResult
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from tests.soak import some
@@ -95,6 +95,22 @@ def test_a_sphere_and_a_zone_beside_the_way_are_met_and_named(tmp_path: Path) ->
     assert met.count("zone") > 20
     assert all(one.start[0] > 900.0 for one in met.each if one.kind == "zone")
     assert met.airspace.zones[next(one for one in met.each if one.zone >= 0).zone].name == "town"
+    # Name, depth and place, in each return's text and in the worst return's; the name in the headline.
+    worst = next(one for one in met.ranges if one.worst.kind == "zone")
+    violation = worst.worst.violation
+    assert violation is not None
+    assert math.hypot(violation.position[0] - 1200.0, violation.position[1]) < 300.0
+    # The zone's ceiling is nearer than its side: a return at up is 300 - up below it.
+    assert 0.0 < violation.depth <= 300.0
+    text = f"m inside zone town at {violation.position[0]:.0f} m east, {violation.position[1]:.0f} m north"
+    scenario = hill_setup(tmp_path, zone).scenario
+    for told in (
+        return_range_text(worst, met, scenario),
+        measured_text(worst.worst, met.limit, scenario),
+        outcome_text(worst.worst, met.limit),
+    ):
+        assert text in told
+    assert " violate zone town" in returns_headline(met)
     assert judged(hill_setup(tmp_path, zone), RTL_ALTITUDE=600.0).count("zone") == 0
 
 

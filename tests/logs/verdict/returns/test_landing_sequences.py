@@ -11,7 +11,12 @@ from logs.verdict.returns.drawn_returns import min_safe_altitudes
 from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world, required_heights
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import describe_return_causes, describe_rtl_ending, returns_headline
-from logs.verdict.returns.suggest_returns import meets_return_limits, suggest_parameters, suggest_rally_points
+from logs.verdict.returns.suggest_returns import (
+    Remedy,
+    meets_return_limits,
+    suggest_parameters,
+    suggest_rally_points,
+)
 from planfly.workflow.open_flight import open_flight
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from tests.logs.verdict.returns.valley import valley_mission
@@ -50,7 +55,10 @@ def test_it_flies_straight_to_the_landing_sequence_over_what_is_between(tmp_path
     assert reaches(found, "ground") == pytest.approx(6000.0 - 5130.0, abs=150.0)
     assert reaches(found, "low") == pytest.approx(6000.0 - 4664.0, abs=150.0)
     assert all(one.safe for one in found.each if one.start[0] > 1500.0)
-    assert describe_rtl_ending(found)[0] == "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4"
+    assert describe_rtl_ending(found)[0] == (
+        "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4; RTL_ALTITUDE has no effect"
+    )
+    assert found.trials_text == "RTL_AUTOLAND, RTL_ALTITUDE, climb"
     assert not found.safe
     assert returns_headline(found).endswith("are safe; the landing is not judged")
 
@@ -119,6 +127,21 @@ def test_suggestions_and_drawn_altitudes_judge_an_approach_as_the_verdict_does(t
     # The valley floor and 30 m: below the mission's altitude everywhere.
     altitudes = min_safe_altitudes(world, starts).altitude
     assert np.all((altitudes > 325.0 + 25.0) & (altitudes < 356.0 + 30.0 + 15.0))
+
+
+def test_another_ending_is_suggested_where_the_altitude_has_no_effect(tmp_path: Path) -> None:
+    """Straight to the landing sequence, returns from the near side meet the hill; home lies on the near side."""
+    setup = hill_setup(tmp_path, "", LANDING)
+    world, starts = make_return_world(setup).with_parameters(RTL_AUTOLAND=2), planned_starts(setup, 8.0)
+    near = starts.subset(np.flatnonzero(starts.rows["east"] < 2000.0))
+    assert suggest_parameters(world, near) == [Remedy({"RTL_AUTOLAND": 3.0})]
+    # Returns from beyond the hill to 30 m need a height, too.
+    world = world.with_parameters(RTL_ALTITUDE=30.0)
+    far = starts.subset(np.flatnonzero(starts.rows["east"] < 4900.0))
+    (found,) = suggest_parameters(world, far)
+    assert sorted(found.parameters) == ["RTL_ALTITUDE", "RTL_AUTOLAND"]
+    assert found.parameters["RTL_AUTOLAND"] == 3.0
+    assert all(one.safe for one in judge_returns(found.apply_to(world), far, 8.0).each)
 
 
 def test_rally_points_are_found_before_a_low_approach(tmp_path: Path) -> None:

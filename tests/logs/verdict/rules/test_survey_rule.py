@@ -22,10 +22,11 @@ from logs.verdict.measures.photo_lines import count_flight_photos, measure_line,
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
+from planfly.surveys.survey_text import overlap_lines
 from tests.logs.verdict.judging import failing, judge
 from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.synthetic import bank_radius, fly_path, make_setup
-from world.terrain import make_flat_terrain
+from world.terrain import make_flat_terrain, make_gridded_terrain
 
 LENGTH, APART, LEAD, UP = 1000.0, 200.0, 300.0, 100.0
 
@@ -419,6 +420,47 @@ def test_the_largest_gap_between_photos_is_named_with_the_spacing_that_has_none(
     measure = measure_overlap(requirements, None, requirements.surveys[0])
     assert measure is not None
     assert (measure.needed_photo_spacing, measure.needed_line_spacing) == pytest.approx((5.0, 20.0))
+
+
+@pytest.mark.parametrize(
+    ("ground", "height", "is_named"),
+    [
+        # 40 m above the hill's foot at one end of each line, and 100 m at the other: photos of 80 m by 200 m.
+        ((60.0, 0.0), 0.0, True),
+        ((60.0, 0.0), 110.0, True),
+        # A level plateau of this height: no line can follow anything.
+        ((60.0, 60.0), 0.0, False),
+        # Even 35 m above the ground, 50 m leave 29 % of photos of 70 m.
+        ((60.0, 0.0), 35.0, False),
+    ],
+)
+def test_lines_at_one_altitude_over_a_slope_do_not_follow_it(
+    ground: tuple[float, float], height: float, is_named: bool
+) -> None:
+    setup = photographed()
+    east, north = np.array([-2000.0, 2000.0]), np.linspace(-2.0, 3.0, 6) * LENGTH
+    slope = np.repeat(np.array(ground).repeat(3)[:, None], 2, axis=1)
+    terrain = make_gridded_terrain(slope, east, north, source="slope", sha256="", datum="mean sea level")
+    low = np.array(lines()) * [1.0, 1.0, 0.0] + [0.0, 0.0, 100.0]
+    plans = tuple(replace(plan, height=height) for plan in setup.mission.survey_plans)
+    setup = replace(
+        setup, mission=replace(setup.mission, survey_plans=plans), route=setup.route.with_fields(position=low)
+    )
+    setup = setup.in_scenario(replace(setup.scenario, terrain=terrain))
+    front = overlaps(judge_geometry(setup))["front overlap"]
+    assert front.ok is False
+    planned = height or 100.0
+    text = (
+        "; the lines are at one altitude and do not follow the terrain: their height above ground ranges from 40 to"
+        f" 100 m, planned {planned:.0f} m; lines that follow the terrain keep the overlap (FollowTerrain of"
+        " QGroundControl's survey; for ArduPlane also altitude frame 10)"
+    )
+    assert (text in front.reason) is is_named
+    assert ("follow the terrain" in front.reason) is is_named
+    requirements = route_requirements(setup)
+    texts = overlap_lines(measure_overlap(requirements, None, requirements.surveys[0]))
+    assert any("must be at most" in line for line in texts) is not is_named
+    assert (text[2:] in texts) is is_named
 
 
 def test_lines_on_both_sides_of_a_notch_are_no_neighbors() -> None:

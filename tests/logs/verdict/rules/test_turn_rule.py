@@ -93,7 +93,7 @@ def test_overshoot(setup: FlightSetup, height: float, ok: bool) -> None:
     assert item.ok
     assert fact(item, "overshoot") == pytest.approx(max(0.0, -height), abs=0.1)
     # Stated once: as a measure, or as what is beyond the limit.
-    told = [f"overshoot {max(0.0, -height):.1f} m" in item.reason, "overshoots its arc by 5 m" in item.reason]
+    told = [f"overshoot {max(0.0, -height):.1f} m" in item.reason, "overshoots its arc by 5.2 m" in item.reason]
     assert told == [ok, not ok]
     assert of(judge(setup, track, envelope=False), "turn", waypoint(1)).ok is ok
     requirements = route_requirements(setup)

@@ -89,7 +89,7 @@ def test_an_arc_that_passes_too_far_is_known_before_the_flight(turn: float, offs
     assert own == pytest.approx(offset, abs=0.5)
     missed = of(judge_geometry(accepting(make_setup(corner(turn)), own - 0.1)), "waypoint", waypoint(1))
     assert (missed.ok, missed.planned) == (False, pytest.approx(own))
-    assert missed.reason.startswith(f"the arc of the {turn:.0f}° corner passes the waypoint {own:.0f} m away")
+    assert missed.reason.startswith(f"the arc of the {turn:.0f}° corner passes the waypoint {own:.1f} m away")
     assert missed.margin == pytest.approx(-0.1, abs=1e-5)
     reached = of(judge_geometry(accepting(make_setup(corner(turn)), own + 0.1)), "waypoint", waypoint(1))
     assert (reached.ok, reached.margin) == (True, pytest.approx(0.1, abs=1e-5))
