@@ -146,7 +146,7 @@ def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot
 
     Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     """
-    name = name or _implied_name(stored)
+    name = name or _implied_autopilot_name(stored)
     if stored.program is None:
         return _load_class({entry.name: entry.autopilot for entry in AUTOPILOTS}[name]).restore(stored)
     return {kind.name: kind for kind in program_classes()}[name].restore(stored)
@@ -159,10 +159,10 @@ def stored_name(autopilot: "Autopilot") -> str | None:
     >>> stored_name(PlanflyGuidance("l1")) is None
     True
     """
-    return None if _implied_name(autopilot.store()) == autopilot.name else autopilot.name
+    return None if _implied_autopilot_name(autopilot.store()) == autopilot.name else autopilot.name
 
 
-def _implied_name(stored: "StoredAutopilot") -> str:
+def _implied_autopilot_name(stored: "StoredAutopilot") -> str:
     """Return the autopilot's name for a log that stores no name.
 
     Stored parameters or a stored program imply ArduPlane. Any other settings imply planfly's guidance.

@@ -22,14 +22,14 @@ class FileRelease(NamedTuple):
 _QGC_COMMENT = re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE)
 
 
-def commented_release(text: str, program: str) -> FileRelease | None:
+def release_in_comments(text: str, program: str) -> FileRelease | None:
     r"""Return the release that the comments of a parameter file state, or None.
 
     program: name of the program, after which a comment may state the release.
 
-    >>> commented_release("# Stack: PX4 Pro\n# Version: 1.15.4 stable\n", "PX4")
+    >>> release_in_comments("# Stack: PX4 Pro\n# Version: 1.15.4 stable\n", "PX4")
     FileRelease(release='1.15', evidence='Version: 1.15')
-    >>> commented_release("#NOTE: ArduPlane V4.5.7\n", "ArduPlane")
+    >>> release_in_comments("#NOTE: ArduPlane V4.5.7\n", "ArduPlane")
     FileRelease(release='4.5', evidence='ArduPlane V4.5')
     """
     in_program_name = re.compile(

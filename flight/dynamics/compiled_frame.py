@@ -22,7 +22,7 @@ from flight.dynamics.vectors import (
     matrix_of,
     matrix_of_quaternion,
     product,
-    product_back,
+    product_with_transpose,
     quaternion_of_angles,
     quaternion_of_matrix,
     quaternion_product,
@@ -292,10 +292,12 @@ def _update_motion(frame: Record) -> None:
     inertial_to_earth = rotation(frame.earth_cos, frame.earth_sin)
     quaternion = (frame.attitude_real, vector_of(frame.attitude))
     inertial_to_body = matrix_of_quaternion(quaternion)
-    local_to_body = product_back(inertial_to_body, product(matrix_of(frame.earth_to_local), inertial_to_earth))
+    local_to_body = product_with_transpose(
+        inertial_to_body, product(matrix_of(frame.earth_to_local), inertial_to_earth)
+    )
     set_matrix(frame.inertial_to_body, inertial_to_body)
     set_matrix(frame.local_to_body, local_to_body)
-    set_matrix(frame.earth_to_body, product_back(inertial_to_body, inertial_to_earth))
+    set_matrix(frame.earth_to_body, product_with_transpose(inertial_to_body, inertial_to_earth))
     earth_velocity = cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position))
     body_velocity = transform(inertial_to_body, subtract(vector_of(frame.velocity), earth_velocity))
     set_vector(frame.body_velocity, body_velocity)

@@ -244,7 +244,7 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
         for index in range(ground_phases.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
-    moved_route = replace(route.with_fields(position=points), notes=flown_notes(route, ground_phases))
+    moved_route = replace(route.with_fields(position=points), notes=route_notes(route, ground_phases))
     return (
         moved_route
         if ground_phases.approach is None or ground_phases.approach.leg < 1
@@ -267,7 +267,7 @@ def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
     return points
 
 
-def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
+def route_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
     """Return a route's notes, without the note that the landing is not flown if the landing is simulated."""
     if ground_phases.approach is None:
         return route.notes

@@ -208,14 +208,14 @@ class MissionItem:
 
         For a command without a position the value is the fifth parameter, unscaled.
         """
-        return self._scaled(self.lat_deg)
+        return self._encode_coordinate(self.lat_deg)
 
     @property
     def y(self) -> int:
         """Longitude as in MISSION_ITEM_INT, or the unscaled sixth parameter of a command without a position."""
-        return self._scaled(self.lon_deg)
+        return self._encode_coordinate(self.lon_deg)
 
-    def _scaled(self, value: float) -> int:
+    def _encode_coordinate(self, value: float) -> int:
         """Return a latitude or longitude (degrees) as MISSION_ITEM_INT carries it, an int32; INT32_MAX for NaN.
 
         A command without a position carries an unscaled parameter in this field.

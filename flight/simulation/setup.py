@@ -14,7 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_phases import GroundPhases, display_waypoints, find_ground_phases, flown_notes
+from flight.mission.ground_phases import GroundPhases, display_waypoints, find_ground_phases, route_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -321,7 +321,7 @@ class FlightSetup:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on the parts of the mission that are not flown as written."""
-        return flown_notes(self.route, self.ground_phases)
+        return route_notes(self.route, self.ground_phases)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Return a copy of the setup in another scenario, with the same route, limits and path."""

@@ -723,7 +723,7 @@ class Flight(RunningFlight):
         launch_end, take_off = None, self._ground_phases.take_off
         if take_off is not None:
             launch_end = find_release(setup, self.map, self._ground, aircraft, take_off)
-        commands = (level_trim.elevator, 0.0, 0.0, self._law.released_throttle)
+        commands = (level_trim.elevator, 0.0, 0.0, self._law.throttle_at_release)
         start_motion = partial(self._start_trimmed, setup.mission.source, start, launch_end, commands)
         start_motion()
         memory = self.guidance_memory

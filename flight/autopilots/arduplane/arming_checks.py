@@ -7,7 +7,7 @@ that each check names. A battery is full, and the aircraft stands at home with i
 import math
 from collections.abc import Iterator, Mapping
 
-from flight.autopilots.arduplane.failsafes import measures_current, monitored_batteries
+from flight.autopilots.arduplane.failsafes import active_battery_monitors, measures_current
 from flight.autopilots.arduplane.parameters import OWN_FENCE_BITS, RADIO_CHANNEL_COUNT, ArduPilotParameters
 from flight.autopilots.parts import MissionParts
 from flight.mission.commands import Command as C
@@ -96,7 +96,7 @@ def describe_failed_arming_checks(
     if has_timeout and parameters.short_failsafe != _SHORT_FAILSAFE_OFF and long_timeout < short_timeout:
         limit_text = f"at least FS_SHORT_TIMEOUT {short_timeout:g}"
         yield f"FS_LONG_TIMEOUT {long_timeout:g} prevents arming: ArduPlane 4.6 requires {limit_text}"
-    for monitor in monitored_batteries(parameters):
+    for monitor in active_battery_monitors(parameters):
         yield from _describe_battery_faults(
             values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
         )

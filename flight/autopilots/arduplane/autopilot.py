@@ -18,7 +18,7 @@ from flight.autopilots.arduplane.ground_law import (
     ground_tick,
 )
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
-from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
+from flight.autopilots.arduplane.launch import motor_start_time, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_loop, arduplane_tick
 from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
 from flight.autopilots.arduplane.open_settings import describe_open_settings
@@ -356,11 +356,11 @@ class ArduPlane(Autopilot):
             ),
             # An RTL that follows the terrain is not simulated.
             unsimulated_text=lambda mission: "terrain" if parameters.rtl_follows_terrain else "",
-            unjudged_texts=self._unjudged_rtl_parts,
+            unsimulated_part_texts=self._unsimulated_rtl_parts,
             trials=ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb"),
         )
 
-    def _unjudged_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
+    def _unsimulated_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
         """Return the parts of a mission's RTLs that are not simulated.
 
         These are the mission's return path, which an RTL follows if RTL_AUTOLAND is 4, and the settings that are not
@@ -494,7 +494,7 @@ class ArduPlaneFromGround:
     def control_law(self) -> ControlLaw:
         """Control law of a flight that starts or ends on the ground."""
         return ControlLaw(
-            ground_tick, ground_loop, ARDUPLANE_GROUND, self._initialise, released_throttle=self.released_throttle
+            ground_tick, ground_loop, ARDUPLANE_GROUND, self._initialise, throttle_at_release=self.throttle_at_release
         )
 
     @property
@@ -506,10 +506,10 @@ class ArduPlaneFromGround:
         take_off = self.ground_phases.take_off
         if take_off is None:
             return -math.inf
-        return motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
+        return motor_start_time(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
 
     @property
-    def released_throttle(self) -> float:
+    def throttle_at_release(self) -> float:
         """Throttle (0..1) when the aircraft leaves the rail."""
         parameters = self.parameters
         # Without a slew limit the throttle opens at once (not 0 times infinity); it is closed if the motor starts

@@ -52,8 +52,8 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
     """
     causes = [
         Cause("the pilot's RTL", "return"),
-        _link_cause(parameters, "control"),
-        _link_cause(parameters, "telemetry"),
+        _link_loss_cause(parameters, "control"),
+        _link_loss_cause(parameters, "telemetry"),
     ]
     battery_action = int(parameters["COM_LOW_BAT_ACT"])
     for name, actions in (("battery critical", _CRITICAL_BATTERY), ("battery emergency", _EMERGENCY_BATTERY)):
@@ -64,7 +64,7 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
     return tuple(causes)
 
 
-def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
+def _link_loss_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
     """Return the loss of a radio link, with PX4's reaction; the reaction is "on" if PX4 ignores the loss.
 
     use: "telemetry" for the ground station's link, "control" for the remote control.
@@ -96,7 +96,7 @@ def link_loss_reactions(parameters: Px4Parameters, use: LinkUse) -> tuple[LinkLo
     >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(parameters, "control")]
     [('circle', 0.5), ('return', 5.5)]
     """
-    _, action, parameter, value = _link_cause(parameters, use)
+    _, action, parameter, value = _link_loss_cause(parameters, use)
     if action == "on":
         return (LinkLossReaction(action, math.inf, parameter, value),)
     delay, hold_time = parameters["COM_DL_LOSS_T" if use == "telemetry" else "COM_RC_LOSS_T"], 0.0

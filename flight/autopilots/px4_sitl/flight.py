@@ -73,7 +73,7 @@ class Px4Flight(SitlFlight):
                 _STALL_TIME_S,
                 _STARTUP_TIMEOUT_S,
             )
-            self._hold_during(self._preflight.identify(flight_parameters.values))
+            self._hold_on_rail_during(self._preflight.identify(flight_parameters.values))
             # The program that flew, from the messages that it sent.
             reported, changed = link.reported, flight_parameters.changed
             unknown_names = changed.keys() - reported.parameters.keys()
@@ -121,7 +121,7 @@ class Px4Flight(SitlFlight):
 
     def _prepare_program(self) -> None:
         """Upload the mission, push the aircraft along the rail, and start the mission meanwhile."""
-        self._hold_during(self._preflight.prepare(self._mission))
+        self._hold_on_rail_during(self._preflight.prepare(self._mission))
         self._push(end_fraction=_MODE_START_FRACTION)
         # PX4 confirms the mode while the aircraft moves on.
         self._mode_start = self._preflight.start_mission()

@@ -55,12 +55,12 @@ _RATE_NOISE_RADPS = 1.5e-3
 _PRESSURE_NOISE_HPA = 5e-3
 
 
-def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
+def earth_magnetic_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
     """Return the Earth's magnetic field (north, east, down) at a position, gauss, from pymavlink's tables.
 
     lat_deg, lon_deg: degrees.
 
-    >>> north, east, down = earth_field(47.4, 8.5)
+    >>> north, east, down = earth_magnetic_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
     (0.22, True, 0.43)
     """
@@ -70,7 +70,7 @@ def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
     return horizontal * math.cos(declination), horizontal * math.sin(declination), strength * math.sin(inclination)
 
 
-def atmosphere(amsl: float) -> tuple[float, float, float]:
+def standard_atmosphere(amsl: float) -> tuple[float, float, float]:
     """Return pressure (Pa), temperature (K) and density (kg/m^3) of the standard atmosphere (ISO 2533).
 
     At sea level it has 288.15 K and 101325 Pa. The temperature falls by 6.5 K per km, and 287.05287 J/(kg K) is the gas
@@ -78,7 +78,7 @@ def atmosphere(amsl: float) -> tuple[float, float, float]:
 
     amsl: m.
 
-    >>> [round(value, 3) for value in atmosphere(1000.0)]
+    >>> [round(value, 3) for value in standard_atmosphere(1000.0)]
     [89874.563, 281.65, 1.112]
     """
     temperature = 288.15 - 0.0065 * amsl
@@ -94,14 +94,14 @@ class Sensors:
 
     def __init__(self, home: Home) -> None:
         self._home = (math.radians(home.lat_deg), math.radians(home.lon_deg), home.alt)
-        self._field = earth_field(home.lat_deg, home.lon_deg)
+        self._field = earth_magnetic_field(home.lat_deg, home.lon_deg)
         self._random = random.Random(1)
 
     def sensor_message(self, motion: BodyMotion) -> Any:
         """Return HIL_SENSOR: readings of the inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
         field = to_body_axes((motion.roll, motion.pitch, motion.yaw), self._field)
-        pressure, temperature, density = atmosphere(self._home[2] - motion.down)
+        pressure, temperature, density = standard_atmosphere(self._home[2] - motion.down)
         return mavlink.MAVLink_hil_sensor_message(
             round(motion.time * 1e6),
             motion.force_x + dither(-_FORCE_NOISE_MPS2, _FORCE_NOISE_MPS2),

@@ -358,7 +358,7 @@ class SitlFlight(ProgramFlight):
             is_named = str(error).startswith(str(self._binary))
             raise error_class.from_error(error, "" if is_named else self._binary) from error
 
-    def _hold_during(self, step: ConversationStep) -> None:
+    def _hold_on_rail_during(self, step: ConversationStep) -> None:
         """Hold the aircraft at rest on the rail during a step of the conversation with the program."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
