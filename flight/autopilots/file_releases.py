@@ -23,7 +23,7 @@ _QGC_COMMENT = re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.I
 
 
 def release_in_comments(text: str, program: str) -> FileRelease | None:
-    r"""Return the release that the comments of a parameter file state, or None.
+    r"""Return the release that the comments of a parameter file state, or None if they state none.
 
     program: name of the program, after which a comment may state the release.
 
@@ -64,7 +64,9 @@ def choose_release_for_file(
     params: str,
     title: str,
 ) -> tuple[_Version, tuple[str, ...]]:
-    """Return the release to simulate with a parameter file, and a note if the file is from another release.
+    """Return the release to simulate with a parameter file, and notes.
+
+    There is one note if the file is from another release, otherwise none.
 
     versions: the simulated releases, oldest first; the newest is simulated if nothing states a release.
     requested_version: release that the user names, or None.

@@ -119,7 +119,7 @@ class SpeedLimits(NamedTuple):
 
 
 class RateLimit(NamedTuple):
-    """Largest climb or sink rate that an autopilot demands, m/s, and its parameter with its value; "" for no limit."""
+    """Largest climb or sink rate that an autopilot demands, m/s, and the parameter that sets it; "" for none."""
 
     rate: float = math.inf
     name: str = ""
@@ -533,7 +533,7 @@ def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
 
 @dataclass(frozen=True)
 class MissionChecks:
-    """Reading and checks of missions, and the settings on which they depend; by default nothing is refused.
+    """Rules by which an autopilot reads and checks missions; by default nothing is refused.
 
     dialect: "ardupilot" refuses missions with a command that ArduPlane refuses. "px4" refuses missions that fail PX4's
         feasibility checks. Of a change of speed PX4 reads only the value, and returns to its own airspeed for a value

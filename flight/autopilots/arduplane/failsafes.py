@@ -38,7 +38,9 @@ def failsafe_causes(
     has_landing_sequence: bool = False,
     ends_with_landing: bool = False,
 ) -> tuple[Cause, ...]:
-    """Return the events that can end a mission in AUTO, each with ArduPlane's reaction, in a fixed order.
+    """Return the events that can end a mission in AUTO, each as a `Cause` with ArduPlane's reaction.
+
+    The order is fixed.
 
     has_fence: True if the mission carries a fence.
     has_landing_sequence: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
@@ -86,9 +88,10 @@ def failsafe_causes(
 
 
 def _control_loss_causes(parameters: ArduPilotParameters) -> list[Cause]:
-    """Return the loss of the remote control, with ArduPlane's reaction by the long failsafe.
+    """Return the loss of the remote control as causes: for the short failsafe, and for the long failsafe.
 
-    A short failsafe that leaves AUTO comes before it. If the loss starts no failsafe, the only reaction is "on".
+    Each cause has ArduPlane's reaction. The short failsafe is left out if it does not leave AUTO. If the loss triggers
+    no failsafe, the result is one cause with the reaction "on": the mission continues.
     """
     long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
     # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
@@ -106,7 +109,7 @@ def _control_loss_causes(parameters: ArduPilotParameters) -> list[Cause]:
 
 
 def _station_loss_cause(parameters: ArduPilotParameters) -> Cause:
-    """Return the loss of the ground station's heartbeats, with ArduPlane's reaction."""
+    """Return the loss of the ground station's heartbeats as a `Cause` with ArduPlane's reaction."""
     if parameters.station_failsafe <= 0.0:
         return Cause("station lost", "on", "FS_GCS_ENABL", 0)
     long_action = int(parameters.long_failsafe)
@@ -180,7 +183,7 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
 
 
 def active_battery_monitors(parameters: ArduPilotParameters) -> list[str]:
-    """Return the prefixes of the battery monitors that are on.
+    """Return the prefix of each battery monitor that is on, such as "BATT" or "BATT2".
 
     The default of BATT_MONITOR depends on the board. If a file does not state BATT_MONITOR, the first monitor is
     assumed to be on.

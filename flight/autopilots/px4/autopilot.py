@@ -236,7 +236,7 @@ class Px4(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Checks of PX4 before a mission (feasibility checks), from FW_LND_ANG and MIS_TKO_LAND_REQ.
+        """PX4's feasibility checks of a mission, which depend on FW_LND_ANG and MIS_TKO_LAND_REQ.
 
         If the user's file is a complete set of parameters, MIS_TKO_LAND_REQ is treated as stated.
 
@@ -351,7 +351,7 @@ class Px4(Autopilot):
         return texts
 
     def _describe_unsimulated_rtl_type(self, rally_distance: float) -> Iterator[str]:
-        """Describe a value of RTL_TYPE for which no RTL is simulated.
+        """Yield a text if no RTL is simulated with the value of RTL_TYPE, otherwise nothing.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
         """
@@ -362,7 +362,7 @@ class Px4(Autopilot):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where the RTL begins, which is not simulated"
 
     def _describe_unsimulated_rtl_parts(self, rally_distance: float) -> Iterator[str]:
-        """Describe settings with which a part of an RTL is not simulated, although the rest of the RTL is.
+        """Yield a text for each setting with which a part of an RTL, but not all of it, is not simulated.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
         """
@@ -389,9 +389,10 @@ class Px4(Autopilot):
         )
 
     def _turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the distance before a waypoint at which PX4 turns in still air, for any turn, m.
+        """Return the distance before a waypoint at which PX4 turns to the next leg in still air, m.
 
-        Up to 1.16 the distance grows with altitude.
+        turn: not used, because the distance is the same for all turns.
+        amsl: altitude, m; up to 1.16 the distance grows with it.
         """
         parameters = self.parameters
         if not parameters.uses_switch_distance:
@@ -400,9 +401,11 @@ class Px4(Autopilot):
         return float(self._acceptance_radii(np.array([speed]))[0])
 
     def _acceptance_radii(self, ground_speeds: Floats) -> Floats:
-        """Return the acceptance radii at ground speeds (n,), m/s, up to PX4 1.16, as (n,) m.
+        """Return the acceptance radius of a waypoint at each ground speed in PX4 up to 1.16, m, (n,).
 
         The radius is the switch distance of the guidance, but at least NAV_ACC_RAD.
+
+        ground_speeds: m/s, (n,).
         """
         parameters = self.parameters
         period = parameters["NPFG_PERIOD"]

@@ -37,7 +37,7 @@ _MIN_HOLD_TIME_S = 0.1
 
 
 def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Cause, ...]:
-    """Return the events that can end a mission, each with PX4's reaction, in a fixed order.
+    """Return the events that can end a mission, each as a `Cause` with PX4's reaction, in a fixed order.
 
     has_fence: True if the mission carries a fence.
 
@@ -65,7 +65,7 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
 
 
 def _link_loss_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
-    """Return the loss of a radio link, with PX4's reaction; the reaction is "on" if PX4 ignores the loss.
+    """Return the loss of a radio link as a `Cause` with PX4's reaction; "on" if PX4 ignores the loss.
 
     use: "telemetry" for the ground station's link, "control" for the remote control.
     """

@@ -325,9 +325,10 @@ class HilLockstep(Lockstep):
         self._awaits_answer = False
 
     def _next_outputs(self) -> tuple[float, ...]:
-        """Return the last answer of PX4; zeros before the first answer.
+        """Return PX4's outputs after the last step; without an answer, the previous outputs.
 
-        If PX4 answers every step, the answer to the last step is awaited; otherwise only for `_EARLY_ANSWER_TIMEOUT_S`.
+        Before the first answer the outputs are zeros. Once PX4 answers every step, wait for the answer. Before that,
+        wait at most `_EARLY_ANSWER_TIMEOUT_S`.
         """
         if self._awaits_answer:
             # A running PX4 answers every step.
@@ -366,7 +367,7 @@ class HilLockstep(Lockstep):
                 self.step_on_rail(rail)
 
     def _next_commands(self) -> Commands:
-        """Return the commands from the latest outputs that PX4 has sent (first step of the last frame); do not wait."""
+        """Return the commands that PX4 sent after the first step of the last frame, without waiting."""
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.value_at_fraction(outputs[ELEVATOR]),
