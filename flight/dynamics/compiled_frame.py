@@ -355,7 +355,7 @@ def _update_atmosphere(frame: Record) -> None:
 
 @inner
 def _update_air_data(frame: Record) -> None:
-    """Compute airspeed, alpha, beta and pressures; and the load factor of the previous step."""
+    """Compute airspeed, angles of attack and sideslip, pressures, and the previous step's load factor."""
     wind = add(vector_of(frame.wind), vector_of(frame.gust))
     u, v, w = subtract(vector_of(frame.body_velocity), transform(matrix_of(frame.local_to_body), wind))
     symmetric_2 = u * u + w * w

@@ -209,7 +209,7 @@ def _grid_airspeeds(aircraft: Aircraft) -> Floats:
 
 
 def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats] | None:
-    """Return the tables that `write_tables` wrote, or None if the file is damaged or for another key.
+    """Return the tables that `write_tables` wrote, or None for a damaged file or another key.
 
     key: values that identify the tables, and that JSON reproduces exactly.
     shapes: shape of each table by its name.

@@ -276,7 +276,7 @@ def trim(
 
 
 def trim_from_vector(values: Floats, amsl: float) -> Trim:
-    """Return the trim at an altitude (m) from a trim vector, whose elements are in the order of `QUANTITIES`."""
+    """Convert a trim vector, in the order of `QUANTITIES`, and an altitude (m) to a trim."""
     airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 
