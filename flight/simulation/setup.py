@@ -55,7 +55,7 @@ class MissionStretch:
 
 @dataclass(frozen=True, slots=True)
 class HeightOffset:
-    """Offset of another altitude in the log from the altitude in use, m, at the judged flight's start."""
+    """One other altitude in the log, and its offset from the altitude in use at the flight's start, m."""
 
     name: str
     offset: float
@@ -307,12 +307,12 @@ class FlightSetup:
 
     @property
     def display_waypoints(self) -> Floats:
-        """Waypoints of the route for pictures and tables, (w, 3) m; its ends are on the ground if they are flown."""
+        """Waypoints for pictures and tables, (w, 3) m; on the ground at a flown take-off or landing."""
         return display_waypoints(self.route, self.ground_phases)
 
     @property
     def started(self) -> str:
-        """Description of the flight's start, and the reasons why a launch or landing of the scenario is not flown."""
+        """Text on the flight's start, with the reason why the scenario's launch or landing is not flown."""
         ground_phases, description = self.ground_phases, self.route.started
         if ground_phases.take_off is not None:
             description = ground_phases.take_off.description()
@@ -340,7 +340,7 @@ class FlightSetup:
 def make_limits(
     scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float, autopilot: Autopilot | None = None
 ) -> Limits:
-    """Return the limits of a path: the scenario's limits, or the aircraft's limits where it states none.
+    """Return the limits of a path from the scenario; limits that it does not state are the aircraft's.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.
