@@ -99,7 +99,7 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _join_names_with_verb(names: list[str]) -> str:
-    """Join up to three names, count the others, and append "is" or "are", for the start of a sentence."""
+    """Return the start of a sentence: up to three names, the number of other names, and "is" or "are"."""
     remainder = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + remainder + (" is" if len(names) == 1 else " are")
 

@@ -84,12 +84,12 @@ class _SurveyItems(NamedTuple):
 
 
 def min_turn_around(route: Route, survey: Survey) -> float:
-    """Return the shortest straight extension of the lines of a survey beyond their photos, m."""
+    """Return the length of the shortest straight run between photos and turn in a survey, m."""
     return min(_lead_lengths(route, survey))
 
 
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
-    """Return the straight extension of each line beyond its photos, at each end of each turn-around, m."""
+    """Return the length of the straight run between photos and turn, at both ends of each turn-around, m."""
     points, pairs = route.positions[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for line, next_line in pairs for pair in ((line.last, line.ends), (next_line.begins, next_line.first))]
     return [math.dist(points[start], points[end]) for start, end in ends]
@@ -156,7 +156,7 @@ def with_layout(
 
 
 def _flown_item_numbers(route: Route) -> frozenset[int]:
-    """Return the numbers of the items that a route leads to."""
+    """Return the item numbers (seq) of a route's waypoints."""
     return frozenset(int(seq) for seq in route.items)
 
 
@@ -361,7 +361,9 @@ def convex_hull(points: Floats) -> Floats | None:
 
 
 def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -> tuple[float, float] | None:
-    """Return where a line enters and leaves a convex outline, m along the line; None if it misses the outline.
+    """Return the coordinates along a line at which it enters and leaves a convex outline, m.
+
+    None if the line misses the outline.
 
     lateral, longitudinal: coordinates of the outline's corners across and along the line, m.
     offset: lateral coordinate of the line, m.
