@@ -268,11 +268,11 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate the flight from stage to stage for up to ``timeout`` s; fill ``result``, and ``positions`` with a row per s.
+    """Simulate the flight from stage to stage for up to ``timeout`` s; fill ``positions`` and ``result``.
 
     start, stages: `RETURN_START` record, and successive targets, loiters or waypoints, as `WAYPOINT` records (n,).
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
-    aircraft, excesses, power, field: parts of a `PointMass`. heights to has_terrain: parts of a `ReturnEnvironment`.
+    aircraft to field, heights to has_terrain: a `PointMass`, a `ReturnEnvironment`. positions: (t, 3), m, one row per s.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `strided_waypoints`.
