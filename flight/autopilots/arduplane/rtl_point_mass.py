@@ -272,7 +272,7 @@ def fly_stages(
 
     start, stages: `RETURN_START` record, and successive targets, loiters or waypoints, as `WAYPOINT` records (n,).
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
-    aircraft to field, heights to has_terrain: a `PointMass`, a `ReturnEnvironment`. positions: (t, 3), m, one row per s.
+    aircraft to field, heights to has_terrain: `PointMass`, `ReturnEnvironment`. positions: (t, 3), m, one row a second.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `strided_waypoints`.
