@@ -113,15 +113,15 @@ class Parameters(Protocol):
 
     @property
     def source(self) -> str:
-        """The user's file; "" without one."""
+        """Path of the user's parameter file; "" without a file."""
 
     @property
     def outside_documented_ranges(self) -> tuple[str, ...]:
-        """Texts on the values of the user's file that are outside their documented ranges."""
+        """One text for each value in the user's file that is outside its documented range."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """Texts on values of the user's file that contradict another parameter."""
+        """One text for each pair of contradicting parameters, at least one of them from the user's file."""
 
     def changed(self, origin: Origin = "file", /, **values: float) -> Self:
         """Return a copy of the parameters in which some have other values.
@@ -258,7 +258,7 @@ class Autopilot(ABC):
         raise ValueError(f"{self.title} has no parameters")
 
     def stated_value(self, name: str) -> float | None:
-        """Return the value of a parameter in the user's file, in the autopilot's unit; None if it is not stated."""
+        """Return a parameter's value in the user's file, in the autopilot's unit; None if the file lacks it."""
         return None if self.parameters is None else self.parameters.by_origin("file").get(name)
 
     # Identity.
@@ -274,7 +274,7 @@ class Autopilot(ABC):
         return ""
 
     def describe(self, aircraft: str) -> str:
-        """Describe the autopilot in a report on a flight: its title, in most subclasses with important settings.
+        """Describe the autopilot for a flight report: its title, in most subclasses with important settings.
 
         aircraft: name of the aircraft that flew.
         """

@@ -46,7 +46,7 @@ PROGRAMS = (
 
 
 def autopilot_names() -> tuple[str, ...]:
-    """Return the names that `--autopilot` accepts: simulated autopilots, also with their releases.
+    """Return the names that `--autopilot` accepts: each simulated autopilot, alone and with each release.
 
     >>> autopilot_names()
     ('ardupilot', 'ardupilot-4.6', 'ardupilot-4.7', 'px4', 'px4-1.16', 'px4-1.17', 'planfly')
@@ -64,7 +64,7 @@ def autopilot_classes() -> "Mapping[str, type[Autopilot]]":
 
 
 def program_classes() -> "Iterator[type[ProgramAutopilot]]":
-    """Yield the classes of the external programs."""
+    """Yield the autopilot class of each external program, importing it first."""
     return (cast("type[ProgramAutopilot]", _load_class(path)) for path in PROGRAMS)
 
 
@@ -117,7 +117,9 @@ def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
 
 
 def find_program_class(program: Path) -> "type[ProgramAutopilot]":
-    """Return the autopilot class that runs an executable built for software in the loop (SITL).
+    """Return the class of the autopilot that a program is, such as ArduPlane for "arduplane".
+
+    program: executable, built for software in the loop (SITL).
 
     >>> find_program_class(Path("arduplane")).name
     'ardupilot'
@@ -146,7 +148,7 @@ def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot
 
     Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     """
-    name = name or _implied_name(stored)
+    name = name or _implied_autopilot_name(stored)
     if stored.program is None:
         return _load_class({entry.name: entry.autopilot for entry in AUTOPILOTS}[name]).restore(stored)
     return {kind.name: kind for kind in program_classes()}[name].restore(stored)
@@ -159,10 +161,10 @@ def stored_name(autopilot: "Autopilot") -> str | None:
     >>> stored_name(PlanflyGuidance("l1")) is None
     True
     """
-    return None if _implied_name(autopilot.store()) == autopilot.name else autopilot.name
+    return None if _implied_autopilot_name(autopilot.store()) == autopilot.name else autopilot.name
 
 
-def _implied_name(stored: "StoredAutopilot") -> str:
+def _implied_autopilot_name(stored: "StoredAutopilot") -> str:
     """Return the autopilot's name for a log that stores no name.
 
     Stored parameters or a stored program imply ArduPlane. Any other settings imply planfly's guidance.

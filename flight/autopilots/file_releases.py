@@ -22,14 +22,14 @@ class FileRelease(NamedTuple):
 _QGC_COMMENT = re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE)
 
 
-def commented_release(text: str, program: str) -> FileRelease | None:
-    r"""Return the release that the comments of a parameter file state, or None.
+def release_in_comments(text: str, program: str) -> FileRelease | None:
+    r"""Return the release that the comments of a parameter file state, or None if they state none.
 
     program: name of the program, after which a comment may state the release.
 
-    >>> commented_release("# Stack: PX4 Pro\n# Version: 1.15.4 stable\n", "PX4")
+    >>> release_in_comments("# Stack: PX4 Pro\n# Version: 1.15.4 stable\n", "PX4")
     FileRelease(release='1.15', evidence='Version: 1.15')
-    >>> commented_release("#NOTE: ArduPlane V4.5.7\n", "ArduPlane")
+    >>> release_in_comments("#NOTE: ArduPlane V4.5.7\n", "ArduPlane")
     FileRelease(release='4.5', evidence='ArduPlane V4.5')
     """
     in_program_name = re.compile(
@@ -64,7 +64,9 @@ def choose_release_for_file(
     params: str,
     title: str,
 ) -> tuple[_Version, tuple[str, ...]]:
-    """Return the release to simulate with a parameter file, and a note if the file is from another release.
+    """Return the release to simulate with a parameter file, and notes.
+
+    There is one note if the file is from another release, otherwise none.
 
     versions: the simulated releases, oldest first; the newest is simulated if nothing states a release.
     requested_version: release that the user names, or None.

@@ -46,7 +46,9 @@ for _ in range(100):
 
 
 class Guard:
-    """Guard process as a context manager; at a normal exit it removes nothing.
+    """Context manager of a process that removes files and kills process groups if planfly is killed.
+
+    At a normal exit the process removes nothing.
 
     >>> with Guard() as guard:
     ...     guard.register_folder(Path("/nowhere/planfly-autopilot-1"))

@@ -199,7 +199,7 @@ def _select_names(names: Iterable[str], matches: Callable[[str], object]) -> lis
 
 
 def _header_vehicle(text: str) -> str | None:
-    """Return the vehicle that a file's header states; "" for an aeroplane, None without a statement."""
+    """Return the vehicle that a file's header states; "" for an aeroplane, None if it states no vehicle."""
     match = _VEHICLE.search(text)
     if match is not None:
         return next((kind for pattern, kind in _VEHICLE_WORDS if re.search(pattern, match[1], re.I)), None)

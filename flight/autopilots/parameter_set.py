@@ -249,7 +249,7 @@ class ParameterSet:
 
     @classmethod
     def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without parameters that the release lacks, and the names that were removed.
+        """Remove parameters that the release lacks; return the sources and the names removed from the user's file.
 
         In this base class the release lacks no parameter, so all sources and no names are returned.
         """
@@ -307,7 +307,7 @@ class ParameterSet:
 
     @cached_property
     def _value_by_name(self) -> dict[str, float]:
-        """Values by name, in the autopilot's units."""
+        """Value of each parameter by name, in the autopilot's units."""
         return {name: value for name, value, _ in self.values}
 
     def changed(self, origin: Origin = "file", /, **values: float) -> Self:
@@ -329,7 +329,7 @@ class ParameterSet:
 
     @property
     def outside_documented_ranges(self) -> tuple[str, ...]:
-        """Texts on the values of the file that are outside their documented ranges, but are flown with."""
+        """One text for each value in the user's file outside its documented range; the value is used anyway."""
         texts = []
         for name, value in self.by_origin("file").items():
             minimum, maximum = self.table.by_name[name].documented or (-math.inf, math.inf)
@@ -339,7 +339,7 @@ class ParameterSet:
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """Texts on the values of the file that contradict another parameter, but are flown with."""
+        """One text for each contradicting pair of parameters; the values are used anyway."""
         return find_contradictions(self.values, self.table.orders)
 
 

@@ -55,7 +55,7 @@ class ControlLaw:
     transfer_state: copies the state of the control law when the flight changes to another route. The arguments are the
         record on the previous route, the record for the new route after ``initialise``, and the start (3,) of the new
         route, m.
-    released_throttle: throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway, of a law
+    throttle_at_release: throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway, of a law
         that takes off.
     """
 
@@ -64,7 +64,7 @@ class ControlLaw:
     memory: np.dtype[np.record] | None = None
     initialise: Callable[[Record, Record], None] = lambda guidance, record: None
     transfer_state: Callable[[Record, Record, Floats], None] = lambda previous_record, record, start: None
-    released_throttle: float = 0.0
+    throttle_at_release: float = 0.0
 
 
 # ----------------------------------------------------------------------
@@ -119,7 +119,7 @@ class SpeedLimits(NamedTuple):
 
 
 class RateLimit(NamedTuple):
-    """Largest climb or sink rate that an autopilot demands, m/s, and its parameter with its value; "" for no limit."""
+    """Largest climb or sink rate that an autopilot demands, m/s, and the parameter that sets it; "" for none."""
 
     rate: float = math.inf
     name: str = ""
@@ -339,7 +339,7 @@ class ReturnBehaviour:
     flies_without_engine: True if ``fly`` also simulates RTLs after an engine failure.
     causes: returns the events that can end a mission, with the autopilot's reaction to each.
     unsimulated_text: returns the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
-    unjudged_texts: returns the parts of RTLs that are not simulated, although the rest of them is.
+    unsimulated_part_texts: returns the parts of RTLs that are not simulated, although the rest of them is.
     path_text: sentence on the path of an RTL; "" if there is nothing to say.
     trials: changes of parameters that may make RTLs safe.
     """
@@ -351,7 +351,7 @@ class ReturnBehaviour:
     flies_without_engine: bool = False
     causes: Callable[[ReturnMission], tuple[Cause, ...]] = lambda mission: ()
     unsimulated_text: Callable[[ReturnMission], str] = lambda mission: ""
-    unjudged_texts: Callable[[ReturnMission], tuple[str, ...]] = lambda mission: ()
+    unsimulated_part_texts: Callable[[ReturnMission], tuple[str, ...]] = lambda mission: ()
     path_text: str = ""
     trials: ReturnTrials = NO_TRIALS
 
@@ -535,7 +535,7 @@ def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
 
 @dataclass(frozen=True)
 class MissionChecks:
-    """Reading and checks of missions, and the settings on which they depend; by default nothing is refused.
+    """Rules by which an autopilot reads and checks missions; by default nothing is refused.
 
     dialect: "ardupilot" refuses missions with a command that ArduPlane refuses. "px4" refuses missions that fail PX4's
         feasibility checks. Of a change of speed PX4 reads only the value, and returns to its own airspeed for a value

@@ -78,7 +78,7 @@ class PointMass(NamedTuple):
 
     @property
     def tables(self) -> tuple[Record, Floats, Floats, Floats]:
-        """Record, tables and wind field, in the form that compiled functions take."""
+        """Arguments of compiled functions: `POINT_MASS` record, excess power, electric power, and wind field."""
         return self.record, self.excess, self.power, self.field
 
 
@@ -212,7 +212,7 @@ def _fill_gaps_along(table: Floats, axis: int) -> None:
 def _fill_gaps(values: Floats) -> None:
     """Fill gaps (NaN) in place by interpolation; beyond the known values, repeat the nearest of them.
 
-    Values without any known value are left unchanged.
+    If all values are gaps, they are left unchanged.
     """
     is_known = ~np.isnan(values)
     if is_known.any():

@@ -58,7 +58,7 @@ class ProgramAutopilot(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Checks of the simulated autopilot, with the list of settings that have no effect in the program's flight.
+        """Mission checks of the simulated autopilot, with the settings that the program's flight ignores.
 
         Heights above terrain are sent to a program as altitudes above sea level.
         """

@@ -43,7 +43,7 @@ def make_return_arrays(timeouts: list[float], *, store_positions: bool) -> tuple
 
 @inner
 def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
-    """Move ``estimated`` to the start of an RTL, and reset ``result``: no clearance, arrival or energy yet.
+    """Move ``estimated`` to the start of an RTL, and reset clearances, arrival and energy in ``result``.
 
     start: position and velocity of the start, a `RETURN_START` record.
     estimated: position and velocity over the ground, a `MOTION` record to fill.

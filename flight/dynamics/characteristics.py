@@ -136,9 +136,10 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 
     a: matrix A (8, 8) of `flight.dynamics.trim.linearise`.
     airspeed: airspeed of the trim, m/s.
-    The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
-    and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is
-    spiral.
+
+    The faster longitudinal mode is the short period, the slower is the phugoid. The faster lateral oscillation is the
+    Dutch roll, and a second, slower one is the roll-spiral. Of the lateral real roots, the faster is roll and the
+    slower is spiral.
     """
     roots, vectors = np.linalg.eig(a)
     # Convert speeds to angles, so that the components of an eigenvector can be compared.

@@ -22,7 +22,7 @@ from flight.dynamics.vectors import (
     matrix_of,
     matrix_of_quaternion,
     product,
-    product_back,
+    product_with_transpose,
     quaternion_of_angles,
     quaternion_of_matrix,
     quaternion_product,
@@ -292,10 +292,12 @@ def _update_motion(frame: Record) -> None:
     inertial_to_earth = rotation(frame.earth_cos, frame.earth_sin)
     quaternion = (frame.attitude_real, vector_of(frame.attitude))
     inertial_to_body = matrix_of_quaternion(quaternion)
-    local_to_body = product_back(inertial_to_body, product(matrix_of(frame.earth_to_local), inertial_to_earth))
+    local_to_body = product_with_transpose(
+        inertial_to_body, product(matrix_of(frame.earth_to_local), inertial_to_earth)
+    )
     set_matrix(frame.inertial_to_body, inertial_to_body)
     set_matrix(frame.local_to_body, local_to_body)
-    set_matrix(frame.earth_to_body, product_back(inertial_to_body, inertial_to_earth))
+    set_matrix(frame.earth_to_body, product_with_transpose(inertial_to_body, inertial_to_earth))
     earth_velocity = cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position))
     body_velocity = transform(inertial_to_body, subtract(vector_of(frame.velocity), earth_velocity))
     set_vector(frame.body_velocity, body_velocity)
@@ -353,7 +355,7 @@ def _update_atmosphere(frame: Record) -> None:
 
 @inner
 def _update_air_data(frame: Record) -> None:
-    """Compute airspeed, alpha, beta and pressures; and the load factor of the previous step."""
+    """Compute airspeed, angles of attack and sideslip, pressures, and the previous step's load factor."""
     wind = add(vector_of(frame.wind), vector_of(frame.gust))
     u, v, w = subtract(vector_of(frame.body_velocity), transform(matrix_of(frame.local_to_body), wind))
     symmetric_2 = u * u + w * w

@@ -259,12 +259,12 @@ def _is_equal(a: float, b: float) -> bool:
     return a == b or (math.isnan(a) and math.isnan(b))
 
 
-def _arm_about_center(position: Sequence[float], centre: Sequence[float]) -> list[float]:
+def _arm_about_center(position: Sequence[float], center: Sequence[float]) -> list[float]:
     """Return the arm from the center of gravity to a position, ft, in body axes.
 
-    position, centre: the position and the center of gravity in JSBSim's structural frame, inches.
+    position, center: the position and the center of gravity in JSBSim's structural frame, inches.
     """
-    return [_INCH * (centre[0] - position[0]), _INCH * (position[1] - centre[1]), _INCH * (centre[2] - position[2])]
+    return [_INCH * (center[0] - position[0]), _INCH * (position[1] - center[1]), _INCH * (center[2] - position[2])]
 
 
 def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:

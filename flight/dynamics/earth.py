@@ -21,7 +21,7 @@ _FOCUS = SEMI_MAJOR * ECCENTRICITY_2
 
 @inner
 def geodetic(position: Vector) -> tuple[float, float, float, float]:
-    """Return geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude, of a position.
+    """Convert a position to geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude.
 
     The method is one iteration of Fukushima's method (Journal of Geodesy 79, 2006), with the variable names of the
     paper.

@@ -150,13 +150,13 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             airspeed = float(airspeeds[airspeed_index])
             if trim := full_throttle_climb(fdm, airspeed, amsl, last_climb):
                 last_climb, climb[airspeed_index, altitude_index] = trim, trim.climb
-                powers["power_full"][airspeed_index, altitude_index] = _power(fdm, trim)
+                powers["power_full"][airspeed_index, altitude_index] = _battery_power(fdm, trim)
             if trim := idle_descent(fdm, airspeed, amsl, last_descent):
                 last_descent, descent[airspeed_index, altitude_index] = trim, -trim.climb
-                powers["power_idle"][airspeed_index, altitude_index] = _power(fdm, trim)
+                powers["power_idle"][airspeed_index, altitude_index] = _battery_power(fdm, trim)
             if trim := steady_flight(fdm, airspeed, amsl, initial_trim=level_trims[-1] if level_trims else None):
                 level_trims.append(trim)
-                powers["power_level"][airspeed_index, altitude_index] = _power(fdm, trim)
+                powers["power_level"][airspeed_index, altitude_index] = _battery_power(fdm, trim)
         min_level_speed[altitude_index], max_level_speed[altitude_index] = _level_speed_range(fdm, amsl, level_trims)
     # A trim is accurate to about 1e-11; nine decimals are the same on every machine.
     return {
@@ -190,7 +190,7 @@ def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tu
     return slowest_trim.airspeed, fastest_trim.airspeed
 
 
-def _power(fdm: Fdm, trim: Trim) -> float:
+def _battery_power(fdm: Fdm, trim: Trim) -> float:
     """Return the battery power in a trim, W; for a fuel engine, the heat of the fuel per second."""
     fdm.apply_trim(trim.vector())
     return float(fdm.read().power)
@@ -209,7 +209,7 @@ def _grid_airspeeds(aircraft: Aircraft) -> Floats:
 
 
 def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats] | None:
-    """Return the tables that `write_tables` wrote, or None if the file is damaged or for another key.
+    """Return the tables that `write_tables` wrote, or None for a damaged file or another key.
 
     key: values that identify the tables, and that JSON reproduces exactly.
     shapes: shape of each table by its name.

@@ -463,7 +463,7 @@ class Fdm:
         return x() * factor, y() * factor, z() * factor
 
     def height(self) -> float:
-        """Return the height above the ground altitude that was set last, m; negative below the ground."""
+        """Return the height above ground, m, negative below it; the ground has the altitude that was set last."""
         return self._read_height() * FOOT
 
     # Functions for trims and linearization.

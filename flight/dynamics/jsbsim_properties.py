@@ -115,7 +115,10 @@ class PropertyAccess:
         return node
 
     def getter(self, name: str) -> Getter:
-        """Return a function that reads a property; for "" it returns zero. Raises FlightError if it is undefined."""
+        """Return a function that reads a property, or returns zero if the name is "".
+
+        Raises FlightError if the property is undefined.
+        """
         if not name:
             return lambda: 0.0
         return self._node(name).get_double_value

@@ -150,11 +150,13 @@ class _Reader:
 def check_model(
     file: Path, provided: Callable[[str], bool], folders: Sequence[Path] = (), *, shipped: bool = False
 ) -> dict[str, bytes]:
-    """Refuse a model that is unsafe for JSBSim; return the files that JSBSim may read, by name.
+    """Refuse a model that is unsafe for JSBSim; return the contents of its files by file name.
+
+    The files are the model itself and the files that it includes.
 
     provided: function that returns True if JSBSim itself has a property of this name before a model is loaded.
     folders: folders of the files that the model includes.
-    shipped: True for a model that JSBSim ships; its channels are removed, and its names are known to be valid.
+    shipped: True for a model that JSBSim ships: its channels are removed, and its property names are not checked.
 
     Raises FlightError, naming file and line, for each of these: a file that cannot be read or is not well formed; a
     document type declaration; an ``<input>`` or ``<output>`` channel; an included file that is not in the folders; and
@@ -190,9 +192,10 @@ def check_model(
 
 
 def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
-    """Return the files of a model that JSBSim ships, by name, in a form that `check_model` accepts.
+    """Return the contents of the files of a model that JSBSim ships, by file name.
 
-    Channels are removed, and entities of a document type are replaced by their text.
+    The contents are in a form that `check_model` accepts: channels are removed, and entities of a document type are
+    replaced by their text.
     """
     files = check_model(aircraft.model_file, lambda _: True, aircraft.model_folders, shipped=True)
     return {name: ElementTree.tostring(ElementTree.fromstring(data)) for name, data in files.items()}

@@ -86,7 +86,7 @@ class Engine:
             if all(abs(difference) < _STEADY_RATE_CHANGE for difference in change):
                 break
             if spin and number >= _FIRST_SETTLE_STEPS:
-                steps = [steps[1], settle_step(steps, previous_change, change)]
+                steps = [steps[1], next_settling_step(steps, previous_change, change)]
                 self._exec.set_dt(steps[1])
             previous_rates, previous_change = rates, change
         self._exec.set_dt(self._dt)
@@ -98,7 +98,7 @@ class Engine:
         self._freeze(0.0)
 
 
-def settle_step(steps: Sequence[float], previous_change: Sequence[float], change: Sequence[float]) -> float:
+def next_settling_step(steps: Sequence[float], previous_change: Sequence[float], change: Sequence[float]) -> float:
     """Return the next time step for settling rates, s: their estimated time constant, within limits.
 
     steps: the last two time steps, s.
@@ -107,7 +107,7 @@ def settle_step(steps: Sequence[float], previous_change: Sequence[float], change
     If the change falls to 0.9 of the previous change in equal steps of 0.2 s, the time constant is 2 s, which is
     limited to 4 times 0.2 s. In an oscillation with -3 times the previous change, the time constant is 0.05 s.
 
-    >>> settle_step((0.2, 0.2), (1.0,), (0.9,)), round(settle_step((0.2, 0.2), (1.0,), (-3.0,)), 9)
+    >>> next_settling_step((0.2, 0.2), (1.0,), (0.9,)), round(next_settling_step((0.2, 0.2), (1.0,), (-3.0,)), 9)
     (0.8, 0.05)
     """
     fastest_index = max(range(len(previous_change)), key=lambda k: abs(previous_change[k]))
@@ -276,7 +276,7 @@ def trim(
 
 
 def trim_from_vector(values: Floats, amsl: float) -> Trim:
-    """Return the trim at an altitude (m) from a trim vector, whose elements are in the order of `QUANTITIES`."""
+    """Convert a trim vector, in the order of `QUANTITIES`, and an altitude (m) to a trim."""
     airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 

@@ -114,7 +114,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 @inlined
-def product_back(a: Matrix, b: Matrix) -> Matrix:
+def product_with_transpose(a: Matrix, b: Matrix) -> Matrix:
     """Return the product of a matrix and the transpose of another matrix."""
     return transform(b, a[0]), transform(b, a[1]), transform(b, a[2])
 

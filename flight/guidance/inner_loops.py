@@ -131,6 +131,7 @@ def follow_roll(
     memory: a `GUIDANCE_MEMORY` record; bank, roll rate and the estimated roll disturbance are stored in it.
     commands: a `COMMANDS` record, whose aileron and rudder are set.
     bank, roll_rate, roll_acceleration: state of the roll model at this tick, rad, rad/s and rad/s^2.
+
     The aileron command has three parts: the deflection for the roll of the model, a feedback of the remaining error,
     and a compensation of gusts and propeller torque. Gusts and torque are estimated from the roll that the ailerons do
     not explain.

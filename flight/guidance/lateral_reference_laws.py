@@ -48,7 +48,7 @@ WAYPOINT = record_dtype(
 
 
 def strided_waypoints(count: int) -> Records:
-    """Return ``count`` zeroed records of `WAYPOINT` in a strided array, as in the records of a flight's path.
+    """Return ``count`` zeroed `WAYPOINT` records in a strided array, like the waypoints in a `Workspace`.
 
     Contiguous records would be another type for Numba, which would compile every control law a second time.
 

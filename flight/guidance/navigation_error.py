@@ -23,7 +23,7 @@ NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float6
 
 
 def start_navigation_error(noise: Floats, lags: Record) -> None:
-    """Initialise the navigation error, so that its statistics do not change during the flight.
+    """Draw the initial navigation error, with the same statistics as later in the flight.
 
     noise: random numbers from the standard normal distribution, (6,).
     lags: a record of `NAVIGATION_LAGS`, which is set.

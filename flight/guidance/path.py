@@ -233,7 +233,7 @@ def fly_by_path(
     fly_over_turn: "none" keeps the corners at fly-over waypoints sharp, for an autopilot with its own turns. "long"
         takes the longer turn at `reversals`, and "short" takes the shorter turn at all waypoints.
 
-    A right angle at 25 m/s in calm air, with 0.5 rad of bank, is an arc with a radius of 117 m:
+    At 25 m/s in calm air with 0.5 rad of bank, the arc at a right angle has a radius of 117 m:
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -525,7 +525,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
 
 
 def _set_circles(corners: Records, route: Route) -> None:
-    """Set radius, center and altitude of the loiter at each corner of a route; without a loiter, the radius 0."""
+    """Set radius, center and altitude of the loiter at each corner of a route; radius 0 without a loiter."""
     turns, courses = signed_turns(route.positions), leg_courses(route.positions)
     corners["loiter_radius"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arc_radii[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.

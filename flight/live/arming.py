@@ -150,9 +150,10 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def continue_from_current_item(self) -> None:
-        """Request that the flight continue from the mission item that a station has just made the current one.
+        """Request that the flight continue at the mission's current item, which a station has just changed.
 
-        The request is a diversion, which `loiter_center` signals; in AUTO its values are not used.
+        The request is made by setting `loiter_center`; the vehicle then diverts the flight. In AUTO the center's values
+        are not used.
         """
         self.loiter_center = LoiterCenter()
 
@@ -178,9 +179,9 @@ class ArmingState:
         self.is_judging, self.mission_state = True, NOT_STARTED
 
     def on_mission_judged(self, verdict: MissionJudged) -> str:
-        """Store the verdict on a mission.
+        """Store the verdict on a mission; disarm the vehicle if the verdict allows no flight.
 
-        If it does not allow a flight, disarm, and return the reason, otherwise "".
+        Returns the reason for disarming, or "" if the vehicle was not disarmed.
         """
         self.is_judging = False
         self.last_verdict = verdict

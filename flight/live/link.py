@@ -355,11 +355,11 @@ class Access:
 
 
 def check_access(access: Access) -> None:
-    """Raise FlightError if other machines could access the vehicle without protection, or cannot be reached.
+    """Raise FlightError if other machines have unprotected access to the vehicle, or cannot be reached.
 
-    Loopback addresses need no protection. Any other address to listen at needs a key or a list of allowed addresses.
-    Any other address to send to needs a key, or must be on that list; it cannot be reached from a loopback address. The
-    error names the argument at fault.
+    Loopback addresses need no protection. To listen at any other address, the vehicle needs a key or a list of allowed
+    addresses. To send to any other address, it needs a key, or the address must be on that list; the vehicle must then
+    not listen at a loopback address. The error names the argument at fault.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))

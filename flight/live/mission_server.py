@@ -323,7 +323,7 @@ class _FinishedUpload:
 
 @dataclass(slots=True)
 class MissionServer:
-    """Server of the vehicle's three lists of items (mission, fence, rally points), which stations upload and download.
+    """Server for uploads and downloads of the vehicle's lists of items: mission, fence and rally points.
 
     lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.
     changed: lists that an upload replaced since the caller last cleared this set.

@@ -248,7 +248,7 @@ class _WaitingArmCommand:
 
 @dataclass(slots=True)
 class Requests:
-    """Handler of requests, which answers with messages for the requesting station and texts for all stations.
+    """Handler of requests: it returns messages for the requesting station, and texts for all stations.
 
     arming: state that commands about arming and modes change.
     parameters: parameters that stations read and set.

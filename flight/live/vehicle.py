@@ -429,7 +429,7 @@ class Vehicle:
         self._refresh_status()
 
     def _judge_changes(self) -> None:
-        """Request a verdict if the mission, the fence, the rally points or the autopilot's parameters have changed."""
+        """Request a verdict if mission, fence, rally points or autopilot parameters have changed."""
         # One request at a time, so that stations that upload faster than missions are judged do not fill the pipe.
         if not self.server.changed or self.arming.flying or self._awaits_verdict:
             return
@@ -533,7 +533,10 @@ class Vehicle:
             self._send_texts(event.texts)
 
     def _handle_verdict(self, verdict: MissionJudged) -> None:
-        """Report the verdict on the current mission, and disarm if it forbids flight; ignore an outdated verdict."""
+        """Report the verdict on the current mission, and disarm if it forbids flight.
+
+        A verdict on an earlier mission is ignored.
+        """
         if verdict.number != self._mission_number:
             return
         self._awaits_verdict = False

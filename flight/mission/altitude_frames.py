@@ -18,7 +18,7 @@ LANDING_HEIGHT_TOLERANCE_M = 30.0
 
 
 class AltitudeReading(NamedTuple):
-    """Heights above ground of an item with its altitude read in two frames, m.
+    """Two heights of an item above ground, m: its altitude read in the stated and in the other frame.
 
     item_index: index of the item in the mission.
     height: height with the frame that the item states.

@@ -219,7 +219,7 @@ class Command(IntEnum):
 
 
 class Treatment(StrEnum):
-    """Treatment of a command in a mission by one autopilot and by planfly's flight of it."""
+    """Effect of a mission command with one autopilot, as planfly simulates it."""
 
     # The flight does what the autopilot does.
     FLOWN = "flown"
@@ -232,7 +232,7 @@ class Treatment(StrEnum):
 
 
 class Support(NamedTuple):
-    """Treatment of a command by each autopilot, with a short reason for the user."""
+    """Treatment of a mission command with each autopilot, and a short reason for the user."""
 
     arduplane: Treatment
     px4: Treatment

@@ -77,12 +77,16 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
     banded_names = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
     notes = []
     if banded_names:
-        notes.append(f"a fence has no floor and no ceiling: {_joined_names(banded_names)} fenced at every height")
+        notes.append(
+            f"a fence has no floor and no ceiling: {_join_names_with_verb(banded_names)} fenced at every height"
+        )
     if closed_names:
-        notes.append(f"an exclusion of a fence cannot have holes: {_joined_names(closed_names)} written without holes")
+        notes.append(
+            f"an exclusion of a fence cannot have holes: {_join_names_with_verb(closed_names)} written without holes"
+        )
     if omitted_names:
         notes.append(
-            f"a flight must stay inside every inclusion of a fence: {_joined_names(omitted_names)} "
+            f"a flight must stay inside every inclusion of a fence: {_join_names_with_verb(omitted_names)} "
             "omitted, because of several separate parts"
         )
     return items, notes
@@ -94,8 +98,8 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
         yield fence_item(origin, command, float(len(ring)), corner)
 
 
-def _joined_names(names: list[str]) -> str:
-    """Join up to three names, count the others, and append "is" or "are", for the start of a sentence."""
+def _join_names_with_verb(names: list[str]) -> str:
+    """Return the start of a sentence: up to three names, the number of other names, and "is" or "are"."""
     remainder = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + remainder + (" is" if len(names) == 1 else " are")
 

@@ -229,7 +229,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 
 
 def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
-    """Return the part of a route between take-off and landing, which the rules for flight in the air judge.
+    """Return the part of a route between take-off and landing, for the rules that judge flight in the air.
 
     ground_phases: take-off and landing that are simulated.
     first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
@@ -244,7 +244,7 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
         for index in range(ground_phases.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
-    moved_route = replace(route.with_fields(position=points), notes=flown_notes(route, ground_phases))
+    moved_route = replace(route.with_fields(position=points), notes=route_notes(route, ground_phases))
     return (
         moved_route
         if ground_phases.approach is None or ground_phases.approach.leg < 1
@@ -267,8 +267,8 @@ def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
     return points
 
 
-def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
-    """Return a route's notes, without the note that the landing is not flown if the landing is simulated."""
+def route_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
+    """Return a route's notes; if the landing is simulated, leave out the note that it is not flown."""
     if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

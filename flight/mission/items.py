@@ -208,15 +208,15 @@ class MissionItem:
 
         For a command without a position the value is the fifth parameter, unscaled.
         """
-        return self._scaled(self.lat_deg)
+        return self._encode_coordinate(self.lat_deg)
 
     @property
     def y(self) -> int:
         """Longitude as in MISSION_ITEM_INT, or the unscaled sixth parameter of a command without a position."""
-        return self._scaled(self.lon_deg)
+        return self._encode_coordinate(self.lon_deg)
 
-    def _scaled(self, value: float) -> int:
-        """Return a latitude or longitude (degrees) as MISSION_ITEM_INT carries it, an int32; INT32_MAX for NaN.
+    def _encode_coordinate(self, value: float) -> int:
+        """Convert a latitude or longitude (degrees) to the int32 of MISSION_ITEM_INT; INT32_MAX for NaN.
 
         A command without a position carries an unscaled parameter in this field.
         """
@@ -406,7 +406,7 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of a parameter that is a count, a size or a jump target, or None for valid parameters."""
+    """Return the fault of a count, size or jump target in an item's parameters, or None if there is none."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

@@ -49,7 +49,7 @@ def item_radius(loiter: Loiter) -> float:
 
 
 def unit_scale(up: float) -> float:
-    """Return 1, the ratio of flown to stated loiter radius for autopilots that fly the same radius at every altitude.
+    """Return 1: the ratio of flown to stated loiter radius of an autopilot that ignores the altitude.
 
     up: altitude of the loiter, m AMSL; not used.
     """

@@ -546,7 +546,7 @@ class _AltitudeConverter:
 
 
 def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Notes) -> RoutePoint:
-    """Merge a stop with the previous stop at the same horizontal position, add a note, and return the merged stop.
+    """Merge a stop with the previous stop at the same horizontal position, and add a note.
 
     The result is the previous stop, or the new stop if the previous stop has no mission item. Raises MissionError if
     the stop is straight above or below the previous stop, unless the stop is a take-off.
@@ -702,7 +702,7 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
 
 
 def _coverage_error(path: str, raster: RasterFile, lat: Floats, lon: Floats) -> TerrainError:
-    """Return the error for an elevation file without data at all positions of a mission, as in another region's file.
+    """Return the error for an elevation file that has no data at any position of a mission.
 
     path: elevation file or built-in name.
     lat, lon: positions of the mission's stops, degrees, (n,).

@@ -84,12 +84,12 @@ class _SurveyItems(NamedTuple):
 
 
 def min_turn_around(route: Route, survey: Survey) -> float:
-    """Return the shortest straight extension of the lines of a survey beyond their photos, m."""
+    """Return the length of the shortest straight run between photos and turn in a survey, m."""
     return min(_lead_lengths(route, survey))
 
 
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
-    """Return the straight extension of each line beyond its photos, at each end of each turn-around, m."""
+    """Return the length of the straight run between photos and turn, at both ends of each turn-around, m."""
     points, pairs = route.positions[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for line, next_line in pairs for pair in ((line.last, line.ends), (next_line.begins, next_line.first))]
     return [math.dist(points[start], points[end]) for start, end in ends]
@@ -105,7 +105,7 @@ def fixed_layout_reason(mission: Mission, route: Route, survey: Survey) -> str:
     index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}
     if any(int(route.items[i]) not in index_by_seq for line in survey.lines for i in range(line.first, line.last + 1)):
         return "a line begins or ends at a waypoint without an item"
-    items = _survey_items(mission, route, survey)
+    items = _find_survey_items(mission, route, survey)
     for first, end in items.lines:
         for item in mission.items[first:end]:
             if is_navigation(item.command) and item.command != Command.NAV_WAYPOINT:
@@ -127,7 +127,7 @@ def with_layout(
     """
     if fixed_layout_reason(mission, route, survey):
         return None
-    items, lines, flown = _survey_items(mission, route, survey), list[_Line](), _flown_items(route)
+    items, lines, flown = _find_survey_items(mission, route, survey), list[_Line](), _flown_item_numbers(route)
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
         corners, line_items = route.positions[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
         line = _Line(corners, line_items, flown)
@@ -155,8 +155,8 @@ def with_layout(
     return renumber_items(replace(mission, items=tuple(numbered)))
 
 
-def _flown_items(route: Route) -> frozenset[int]:
-    """Return the numbers of the items that a route leads to."""
+def _flown_item_numbers(route: Route) -> frozenset[int]:
+    """Return the item numbers (seq) of a route's waypoints."""
     return frozenset(int(seq) for seq in route.items)
 
 
@@ -169,14 +169,14 @@ def _is_line_point(item: MissionItem, flown: Collection[int]) -> bool:
     return is_navigation(item.command) or (item.command == Command.CONDITION_GATE and item.seq in flown)
 
 
-def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
+def _find_survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
     """Return the indices of a survey's items, line by line.
 
     The items of a line include the commands after its last waypoint, such as one that switches the camera.
     """
     index_by_seq = {item.seq: item_index for item_index, item in enumerate(mission.items)}
     item_count = len(mission.items)
-    seqs, flown = [int(seq) for seq in route.items], _flown_items(route)
+    seqs, flown = [int(seq) for seq in route.items], _flown_item_numbers(route)
 
     def index(waypoint: int) -> int:
         """Return the list index of a waypoint's item; the length of the list for a waypoint without an item."""
@@ -361,7 +361,9 @@ def convex_hull(points: Floats) -> Floats | None:
 
 
 def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -> tuple[float, float] | None:
-    """Return where a line enters and leaves a convex outline, m along the line; None if it misses the outline.
+    """Return the coordinates along a line at which it enters and leaves a convex outline, m.
+
+    None if the line misses the outline.
 
     lateral, longitudinal: coordinates of the outline's corners across and along the line, m.
     offset: lateral coordinate of the line, m.

@@ -530,7 +530,7 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
-    """Return True if two lines that bend are still parallel some runs away from the turn-around between them.
+    """Return True if two bent lines are also parallel in runs farther from the turn-around between them.
 
     run, next_run: last run of the first line, and first run of the second line.
     bend_count: number of bends between the turn-around and the runs that are compared.
@@ -591,7 +591,7 @@ def _make_survey(
 
 
 def _make_photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """Return the part of a run on which the camera is on, as a line; the whole run if the camera is never on.
+    """Return the part of a run with the camera on, as a line; the whole run if the camera is never on.
 
     run: indices of the first and last waypoint.
     camera: distance between photos on the leg after each waypoint, (w,) m; 0 with the camera off.

@@ -14,7 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_phases import GroundPhases, display_waypoints, find_ground_phases, flown_notes
+from flight.mission.ground_phases import GroundPhases, display_waypoints, find_ground_phases, route_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -55,7 +55,7 @@ class MissionStretch:
 
 @dataclass(frozen=True, slots=True)
 class HeightOffset:
-    """Offset of another altitude in the log from the altitude in use, m, at the judged flight's start."""
+    """One other altitude in the log, and its offset from the altitude in use at the flight's start, m."""
 
     name: str
     offset: float
@@ -307,12 +307,12 @@ class FlightSetup:
 
     @property
     def display_waypoints(self) -> Floats:
-        """Waypoints of the route for pictures and tables, (w, 3) m; its ends are on the ground if they are flown."""
+        """Waypoints for pictures and tables, (w, 3) m; on the ground at a flown take-off or landing."""
         return display_waypoints(self.route, self.ground_phases)
 
     @property
     def started(self) -> str:
-        """Description of the flight's start, and the reasons why a launch or landing of the scenario is not flown."""
+        """Text on the flight's start, with the reason why the scenario's launch or landing is not flown."""
         ground_phases, description = self.ground_phases, self.route.started
         if ground_phases.take_off is not None:
             description = ground_phases.take_off.description()
@@ -321,7 +321,7 @@ class FlightSetup:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on the parts of the mission that are not flown as written."""
-        return flown_notes(self.route, self.ground_phases)
+        return route_notes(self.route, self.ground_phases)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Return a copy of the setup in another scenario, with the same route, limits and path."""
@@ -340,7 +340,7 @@ class FlightSetup:
 def make_limits(
     scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float, autopilot: Autopilot | None = None
 ) -> Limits:
-    """Return the limits of a path: the scenario's limits, or the aircraft's limits where it states none.
+    """Return the limits of a path from the scenario; limits that it does not state are the aircraft's.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.

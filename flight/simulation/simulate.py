@@ -634,10 +634,10 @@ def _to_true_north(east: float, north: float, convergence: float) -> tuple[float
 def release_aircraft(
     fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Put the aircraft into the state at the end of its launch, with control commands; return them.
+    """Put the aircraft into the state at the end of its launch; return the control commands.
 
     release_state: position, attitude, velocity, wind and ground at the release.
-    commands: elevator, aileron, rudder (rad) and throttle (0..1).
+    commands: elevator, aileron, rudder (rad) and throttle (0..1), which are set and returned.
     """
     fdm.release(
         release_state.position,
@@ -723,7 +723,7 @@ class Flight(RunningFlight):
         launch_end, take_off = None, self._ground_phases.take_off
         if take_off is not None:
             launch_end = find_release(setup, self.map, self._ground, aircraft, take_off)
-        commands = (level_trim.elevator, 0.0, 0.0, self._law.released_throttle)
+        commands = (level_trim.elevator, 0.0, 0.0, self._law.throttle_at_release)
         start_motion = partial(self._start_trimmed, setup.mission.source, start, launch_end, commands)
         start_motion()
         memory = self.guidance_memory

@@ -396,7 +396,7 @@ _LIMIT_TOLERANCE_FRACTION = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Return the name of each control with its greatest deflection in either direction, rad; 1 for the throttle.
+    """Return the name and the greatest deflection (rad; 1 for the throttle) of each control.
 
     aircraft: name or folder of the aircraft; the deflections of an unknown aircraft are NaN.
 

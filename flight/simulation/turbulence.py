@@ -32,7 +32,7 @@ def dryden_scales(height: float) -> tuple[float, float, float]:
 
 
 def start_gusts(noise: Floats, filters: Record) -> None:
-    """Draw the initial state of the gust filters, so that gusts have the same statistics throughout the flight.
+    """Draw the initial state of the gust filters, with the same statistics as later in the flight.
 
     noise: random numbers from the standard normal distribution, (5,).
     filters: a record of `GUST_FILTERS`, which is set.

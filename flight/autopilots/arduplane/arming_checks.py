@@ -7,7 +7,7 @@ that each check names. A battery is full, and the aircraft stands at home with i
 import math
 from collections.abc import Iterator, Mapping
 
-from flight.autopilots.arduplane.failsafes import measures_current, monitored_batteries
+from flight.autopilots.arduplane.failsafes import active_battery_monitors, measures_current
 from flight.autopilots.arduplane.parameters import OWN_FENCE_BITS, RADIO_CHANNEL_COUNT, ArduPilotParameters
 from flight.autopilots.parts import MissionParts
 from flight.mission.commands import Command as C
@@ -47,7 +47,9 @@ _LOWEST_FENCE_FLOOR_M = -100.0
 def describe_failed_arming_checks(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
-    """Describe each pre-arm check that the settings fail; yield nothing if the settings disable the checks.
+    """Yield one sentence for each pre-arm check that fails with these settings.
+
+    Yields nothing if the settings disable the checks.
 
     values: value of every parameter by name; the default where no file states one.
     """
@@ -96,7 +98,7 @@ def describe_failed_arming_checks(
     if has_timeout and parameters.short_failsafe != _SHORT_FAILSAFE_OFF and long_timeout < short_timeout:
         limit_text = f"at least FS_SHORT_TIMEOUT {short_timeout:g}"
         yield f"FS_LONG_TIMEOUT {long_timeout:g} prevents arming: ArduPlane 4.6 requires {limit_text}"
-    for monitor in monitored_batteries(parameters):
+    for monitor in active_battery_monitors(parameters):
         yield from _describe_battery_faults(
             values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
         )
@@ -106,7 +108,7 @@ def describe_failed_arming_checks(
 def _describe_battery_faults(
     values: Mapping[str, float], monitor: str, full_voltage: float, *, has_current: bool
 ) -> Iterator[str]:
-    """Describe failsafe thresholds of one battery monitor that prevent arming.
+    """Yield a sentence for each failsafe threshold of one battery monitor that prevents arming.
 
     The low threshold prevents arming if it is below the critical threshold. Any threshold prevents arming if it exceeds
     the charge or the voltage of a full battery. Follows `AP_BattMonitor_Backend::arming_checks`.
@@ -135,7 +137,7 @@ def _describe_battery_faults(
 def _describe_fence_faults(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
-    """Describe a fence that prevents arming: it has no limits, its limits are unusable, or home violates it.
+    """Yield the reasons why a fence prevents arming: no limits, unusable limits, or home violates it.
 
     Follows `AC_Fence::pre_arm_check`.
 

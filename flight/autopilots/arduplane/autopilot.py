@@ -18,7 +18,7 @@ from flight.autopilots.arduplane.ground_law import (
     ground_tick,
 )
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
-from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
+from flight.autopilots.arduplane.launch import motor_start_time, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_loop, arduplane_tick
 from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
 from flight.autopilots.arduplane.open_settings import describe_open_settings
@@ -119,8 +119,8 @@ class ArduPlane(Autopilot):
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
         """Return the autopilot with parameters from the user's file, the aircraft's file, and the defaults.
 
-        The simulated release is the first known of: the release that the table states, the release that wrote the file,
-        the newest release.
+        The simulated release is the release that the table states, or else the release that wrote the user's file, or
+        else the newest release.
         """
         version, notes = table.arduplane_version or NEWEST_ARDUPLANE, tuple[str, ...]()
         if table.params is not None:
@@ -131,7 +131,7 @@ class ArduPlane(Autopilot):
     def restore(cls, stored: StoredAutopilot) -> Self:
         """Return the autopilot with the parameters and the release that a log stores.
 
-        A log without a release was flown with the control law of 4.6.
+        If the log states no release, the release is 4.6.
         """
         version = stored.version or "4.6"
         if stored.parameters is None:
@@ -152,9 +152,9 @@ class ArduPlane(Autopilot):
     def from_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return ArduPlane with the parameters of a flight log, written by any ArduPlane release, and notes.
+        """Return ArduPlane with the parameters of a flight log, and notes on values that cannot be used.
 
-        Return None for the log of another program.
+        The log may be from any ArduPlane release. Return None for the log of another program.
         """
         if not program.startswith("ArduP"):
             return None
@@ -196,7 +196,7 @@ class ArduPlane(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """ArduPlane's rules for mission commands, and checks by TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*.
+        """Checks of missions by ArduPlane, from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*.
 
         The checks list settings that the simulated ArduPlane ignores; the ArduPlane program itself uses some of them.
 
@@ -225,7 +225,7 @@ class ArduPlane(Autopilot):
 
     @property
     def _parameter_values(self) -> dict[str, float]:
-        """Values of the set's parameters by name, including default values."""
+        """Value of every parameter by name; the default where no file states one."""
         return {name: value for name, value, _ in self.parameters.values}
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
@@ -356,7 +356,7 @@ class ArduPlane(Autopilot):
             ),
             # An RTL that follows the terrain is not simulated.
             unsimulated_text=lambda mission: "terrain" if parameters.rtl_follows_terrain else "",
-            unjudged_texts=self._unjudged_rtl_parts,
+            unsimulated_part_texts=self._unsimulated_rtl_parts,
             trials=ReturnTrials(
                 (altitude,),
                 (*climbs, {"FLIGHT_OPTIONS": options}),
@@ -365,11 +365,11 @@ class ArduPlane(Autopilot):
             ),
         )
 
-    def _unjudged_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
-        """Return the parts of a mission's RTLs that are not simulated.
+    def _unsimulated_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
+        """Return texts on the parts of a mission's RTLs that are not simulated.
 
-        These are the mission's return path, which an RTL follows if RTL_AUTOLAND is 4, and the settings that are not
-        simulated in any flight.
+        These parts are the mission's return path, which an RTL follows if RTL_AUTOLAND is 4, and every setting that is
+        not simulated in any flight.
         """
         has_path = not mission.commands.isdisjoint((Command.DO_RETURN_PATH_START, Command.DO_LAND_START))
         path_parts = ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
@@ -460,7 +460,7 @@ class ArduPlane(Autopilot):
         }
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
-        """Return the simulated ArduPlane with some parameters changed, even if this autopilot runs the program."""
+        """Return a simulated ArduPlane with some parameters changed, also if this autopilot is the program."""
         return ArduPlane(self.parameters.changed(origin, **values))
 
 
@@ -499,22 +499,22 @@ class ArduPlaneFromGround:
     def control_law(self) -> ControlLaw:
         """Control law of a flight that starts or ends on the ground."""
         return ControlLaw(
-            ground_tick, ground_loop, ARDUPLANE_GROUND, self._initialise, released_throttle=self.released_throttle
+            ground_tick, ground_loop, ARDUPLANE_GROUND, self._initialise, throttle_at_release=self.throttle_at_release
         )
 
     @property
     def motor_start(self) -> float:
-        """Time of the motor start, s after the release, negative for a start on the rail; inf if it never starts.
+        """Time of the motor start, s after the release; negative for a start on the rail.
 
-        It is -inf if the motor runs before the launch, and without a take-off.
+        It is inf if the motor never starts. It is -inf if the motor runs before the launch, or without a take-off.
         """
         take_off = self.ground_phases.take_off
         if take_off is None:
             return -math.inf
-        return motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
+        return motor_start_time(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
 
     @property
-    def released_throttle(self) -> float:
+    def throttle_at_release(self) -> float:
         """Throttle (0..1) when the aircraft leaves the rail."""
         parameters = self.parameters
         # Without a slew limit the throttle opens at once (not 0 times infinity); it is closed if the motor starts

@@ -38,7 +38,9 @@ def failsafe_causes(
     has_landing_sequence: bool = False,
     ends_with_landing: bool = False,
 ) -> tuple[Cause, ...]:
-    """Return the events that can end a mission in AUTO, each with ArduPlane's reaction, in a fixed order.
+    """Return the events that can end a mission in AUTO, each as a `Cause` with ArduPlane's reaction.
+
+    The order is fixed.
 
     has_fence: True if the mission carries a fence.
     has_landing_sequence: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
@@ -58,11 +60,11 @@ def failsafe_causes(
     causes = [
         Cause("the pilot's RTL", "return"),
         Cause("the mission's end", "landed" if ends_with_landing else "return"),
-        *_remote_control_causes(parameters),
-        _station_cause(parameters),
+        *_control_loss_causes(parameters),
+        _station_loss_cause(parameters),
     ]
     # A battery failsafe never reacts without a monitor, or without a threshold that the monitor can measure.
-    monitors = monitored_batteries(parameters)
+    monitors = active_battery_monitors(parameters)
     for monitor in dict.fromkeys(["BATT", *monitors]):
         number = "" if monitor == "BATT" else f" {monitor.removeprefix('BATT')}"
         for level, name in (("LOW", "low"), ("CRT", "critical")):
@@ -85,10 +87,11 @@ def failsafe_causes(
     return tuple(causes)
 
 
-def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
-    """Return the loss of the remote control, with ArduPlane's reaction by the long failsafe.
+def _control_loss_causes(parameters: ArduPilotParameters) -> list[Cause]:
+    """Return the loss of the remote control as causes: for the short failsafe, and for the long failsafe.
 
-    A short failsafe that leaves AUTO comes before it. If the loss starts no failsafe, the only reaction is "on".
+    Each cause has ArduPlane's reaction. The short failsafe is left out if it does not leave AUTO. If the loss triggers
+    no failsafe, the result is one cause with the reaction "on": the mission continues.
     """
     long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
     # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
@@ -105,8 +108,8 @@ def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
     return [short_failsafe, long_failsafe]
 
 
-def _station_cause(parameters: ArduPilotParameters) -> Cause:
-    """Return the loss of the ground station's heartbeats, with ArduPlane's reaction."""
+def _station_loss_cause(parameters: ArduPilotParameters) -> Cause:
+    """Return the loss of the ground station's heartbeats as a `Cause` with ArduPlane's reaction."""
     if parameters.station_failsafe <= 0.0:
         return Cause("station lost", "on", "FS_GCS_ENABL", 0)
     long_action = int(parameters.long_failsafe)
@@ -133,12 +136,12 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
     """
     long_delay = parameters["FS_LONG_TIMEOUT"]
     if use == "telemetry":
-        causes, delays = [_station_cause(parameters)], [long_delay]
+        causes, delays = [_station_loss_cause(parameters)], [long_delay]
     else:
         short_delay = parameters["FS_SHORT_TIMEOUT"]
         if int(parameters.short_failsafe) != _NO_SHORT_FAILSAFE:
             long_delay += short_delay
-        causes = _remote_control_causes(parameters)
+        causes = _control_loss_causes(parameters)
         delays = [short_delay, long_delay][-len(causes) :]
     reactions = [
         LinkLossReaction(cause.action, delay, cause.parameter, cause.value)
@@ -161,7 +164,7 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
     >>> [(failsafe.parameter, failsafe.used_charge) for failsafe in battery_failsafes(parameters)]
     [('BATT_LOW_MAH', 6500.0)]
     """
-    monitors = monitored_batteries(parameters)
+    monitors = active_battery_monitors(parameters)
     failsafes = []
     for monitor in monitors:
         for level in ("LOW", "CRT"):
@@ -179,14 +182,14 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
     return tuple(failsafes)
 
 
-def monitored_batteries(parameters: ArduPilotParameters) -> list[str]:
-    """Return the prefixes of the battery monitors that are on.
+def active_battery_monitors(parameters: ArduPilotParameters) -> list[str]:
+    """Return the prefix of each battery monitor that is on, such as "BATT" or "BATT2".
 
     The default of BATT_MONITOR depends on the board. If a file does not state BATT_MONITOR, the first monitor is
     assumed to be on.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> monitored_batteries(ArduPilotParameters.defaults().changed(BATT3_MONITOR=4))
+    >>> active_battery_monitors(ArduPilotParameters.defaults().changed(BATT3_MONITOR=4))
     ['BATT', 'BATT3']
     """
     is_unstated = "BATT_MONITOR" in parameters.by_origin("default")

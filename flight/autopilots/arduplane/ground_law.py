@@ -224,9 +224,9 @@ def ground_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a compiled model, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return the code of the flight's end.
 
-    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    The code is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
     block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.
@@ -473,7 +473,7 @@ def _begin_first_leg(
     The aircraft flies straight to the end of the leg, without a line to follow (`Plane::set_next_WP`).
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
-    waypoints: `WAYPOINT` records of the route, (w,); the end of the leg is marked as without cross-track control.
+    waypoints: `WAYPOINT` records of the route, (w,); the leg's end is marked as flown to without a line.
     pieces: pieces of the reference path; the guidance advances to the first one of the leg.
     guidance: `GUIDANCE_MEMORY` record; its piece is updated.
     ground: state of take-off and landing; its stage becomes `IN_AIR`.

@@ -41,14 +41,14 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
 
 
 def landing_glide(height: float, distance: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
-    """Return the glide path to a landing point from the waypoint before the landing point.
+    """Return ArduPlane's glide from the last waypoint to the landing point.
 
     height: height of the waypoint above the landing point, m.
     distance: distance of the waypoint from the landing point, m.
     ground_speed: m/s.
 
-    At 20 m/s the sink rate from 54 m over 600 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
-    3.6 / (0.125 + 0.9) s, in which the aircraft flies 70 m.
+    From a height of 54 m over 600 m at 20 m/s the sink rate is 1.8 m/s. The flare starts 2 s above the ground, at
+    3.6 m. It lasts 3.6 / (0.125 + 0.9) s, in which the aircraft flies 70 m.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> glide = landing_glide(54.0, 600.0, 20.0, ArduPilotParameters.defaults())

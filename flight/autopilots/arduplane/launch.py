@@ -20,7 +20,7 @@ _PITCH_RANGE_RAD = (math.radians(-30.0), math.radians(45.0))
 _MOTOR_START_TIMEOUT_S = 5.0
 
 
-def motor_start(acceleration: float, speed: float, incline: float, parameters: ArduPilotParameters) -> float:
+def motor_start_time(acceleration: float, speed: float, incline: float, parameters: ArduPilotParameters) -> float:
     """Return the time from the release to the motor start, s; negative if the motor starts on the rail.
 
     The result is inf if the motor never starts, and -inf if the motor runs before the launch.
@@ -34,9 +34,9 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> parameters = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
-    >>> [round(motor_start(v * v / 12.0, v, 0.2, parameters), 2) for v in (20.0, 10.0)]
+    >>> [round(motor_start_time(v * v / 12.0, v, 0.2, parameters), 2) for v in (20.0, 10.0)]
     [-0.4, inf]
-    >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, parameters)
+    >>> motor_start_time(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start_time(0.0, 0.0, 0.0, parameters)
     (-inf, inf)
     """
     min_acceleration, delay = parameters.takeoff_acceleration, parameters.takeoff_delay
@@ -80,7 +80,7 @@ def run_up_time(start_time: float, parameters: ArduPilotParameters) -> float:
 
     The time is 0 if the motor starts during the launch or after it.
 
-    start_time: result of `motor_start`, s; -inf if the motor starts on the ground before the launch.
+    start_time: result of `motor_start_time`, s; -inf if the motor starts on the ground before the launch.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> parameters = ArduPilotParameters.defaults()

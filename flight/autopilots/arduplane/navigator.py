@@ -327,7 +327,7 @@ def _update_loiter(
     """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
 
     Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its center, then around it. The
-    next leg begins once the loiter is complete and the course leads to the next waypoint of another stop.
+    next leg begins once the loiter is complete and the course leads to the next waypoint outside this loiter.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).

@@ -157,7 +157,7 @@ _FREE_BANK_HEIGHT_RATIO = 3.0
 
 
 def describe_open_settings(parameters: ArduPilotParameters, mission: MissionParts, *, by_program: bool) -> list[str]:
-    r"""Describe each parameter that affects a mission's flight but is not simulated.
+    r"""Return a sentence for each parameter that affects a mission's flight but is not simulated.
 
     The texts have no full stop.
 
@@ -219,7 +219,7 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
 def _describe_dependent_settings(
     parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
 ) -> Iterator[str]:
-    """Describe settings whose effect depends on other settings, the mission or the aircraft."""
+    """Yield a sentence for each open setting whose effect depends on other settings, mission or aircraft."""
     # Each control (ailerons, elevator, motor) to which a user's file with servo parameters assigns no servo output.
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
     pins = int(values["SERVO_GPIO_MASK"])
@@ -294,7 +294,7 @@ def _describe_dependent_settings(
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:
-    """Describe gains of the user's file that are too low or too high to control the aircraft's attitude.
+    """Yield a sentence for each of the user's gains that is too low or too high to control the attitude.
 
     The gains in the aircraft's file and ArduPlane's defaults are assumed to suit the aircraft.
     """

@@ -478,16 +478,16 @@ class ArduPilotParameters(ParameterSet):
 
     @classmethod
     def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values in the aircraft's file by name, without those that the aircraft needs in any case."""
+        """Return the values in the aircraft's file by name, except the parameters in `_NEEDED_BY_AIRCRAFT`."""
         values, _ = cls.table.read(entries)
         return {name: value for name, value in values.items() if name not in _NEEDED_BY_AIRCRAFT}
 
     @classmethod
     def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without parameters that release 4.6 lacks, and the names that were removed.
+        """Remove parameters that release 4.6 lacks; return the sources and the names removed from the user's file.
 
-        Release 4.6 uses fixed values instead of these parameters; an additional source states them. For other releases
-        nothing is removed.
+        Release 4.6 uses fixed values instead of these parameters, which an additional source states. For any other
+        release the sources are returned unchanged.
 
         fields: the other arguments of the class; the first is the release.
         """

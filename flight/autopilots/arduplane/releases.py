@@ -11,7 +11,7 @@ from typing import NamedTuple, get_args
 
 from flight.autopilots.arduplane.parameters import TABLE
 from flight.autopilots.arduplane.renamed_parameters import NAMES_BEFORE_4_7, NAMES_SINCE_4_7, describe_renamed
-from flight.autopilots.file_releases import FileRelease, choose_release_for_file, commented_release, nearest_release
+from flight.autopilots.file_releases import FileRelease, choose_release_for_file, nearest_release, release_in_comments
 from flight.autopilots.parameter_files import MAX_BYTES, parse_parameters
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
@@ -65,7 +65,7 @@ def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     >>> file_release("", ["ALT_SLOPE_MIN", "GLIDE_SLOPE_MIN"]) is None
     True
     """
-    if (commented := commented_release(text, "ArduPlane")) is not None:
+    if (commented := release_in_comments(text, "ArduPlane")) is not None:
         return commented
     file_names = list(names)
     newer = [name for name in file_names if name in NAMES_SINCE_4_7]

@@ -81,9 +81,10 @@ def name_in_release(name: str, version: ArduPlaneVersion) -> str:
 
 
 def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPlaneVersion) -> str:
-    """Describe in one line the parameters that a release names differently; "" without any.
+    """Describe in one line which of a file's parameters have another name in a release; "" for none.
 
-    used: names that the control law reads. Of the other names, only the first is mentioned.
+    names: names in the file.
+    used: names in the file that the control law reads. Of the other names, the text mentions only the first.
 
     >>> describe_renamed(["GLIDE_SLOPE_MIN", "WP_RADIUS"], ["GLIDE_SLOPE_MIN"], "4.7")
     'GLIDE_SLOPE_MIN is read as ALT_SLOPE_MIN, its name in ArduPlane 4.7'

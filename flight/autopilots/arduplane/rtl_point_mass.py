@@ -214,7 +214,7 @@ _STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 
 def waypoint_ahead(start: Record) -> Records:
-    """Return a waypoint far ahead on the present course and slope, as one `WAYPOINT` record, (1,)."""
+    """Return a waypoint far ahead of a start, on its course and slope, as one `WAYPOINT` record, (1,)."""
     waypoint: Records = np.zeros(1, WAYPOINT)
     ground_speed = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
@@ -272,8 +272,8 @@ def fly_stages(
 
     start, stages: `RETURN_START` record, and successive targets, loiters or waypoints, as `WAYPOINT` records (n,).
     climb, climb_parameters: the climb at the start and its parameters. engine_out: True if the engine failed there.
+    aircraft to field, heights to has_terrain: `PointMass`, `ReturnEnvironment`. positions: (t, 3), m, one row a second.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions: one row a second, m. aircraft to field, heights to has_terrain: a `PointMass` and a `ReturnEnvironment`.
     """
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `strided_waypoints`.
     waypoints, loiter = spaced[::2], progress_records[0]

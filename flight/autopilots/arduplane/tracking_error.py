@@ -77,7 +77,7 @@ def tracking_error(
     fly_over: bool = False,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return ArduPlane's deviations from a plan, for which the plan needs margins.
+    """Return ArduPlane's deviations from the legs of a plan, which the plan must allow for.
 
     airspeed: equivalent airspeed, m/s.
     nav: accuracy of navigation.
@@ -116,10 +116,11 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corner_tables(
     parameters: ArduPilotParameters, airspeed: float, fly_over: bool
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the acceptance radius, the excursion, and the affected length of each leg at corners, m.
+    """Return four tables on corners, m: acceptance radius, excursion, affected length before and after.
 
-    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`. The excursion, the
-    greatest distance from the legs, includes the margin for wind.
+    Each table has one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`. The excursion is the greatest
+    distance from the legs, including the margin for wind. The affected lengths are parts of the legs before and after
+    the corner.
     """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_RATIOS * airspeed

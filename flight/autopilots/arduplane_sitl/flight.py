@@ -8,7 +8,7 @@ from pathlib import Path
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.launch import motor_start, run_up_time
+from flight.autopilots.arduplane.launch import motor_start_time, run_up_time
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.releases import simulated_release
 from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
@@ -70,7 +70,7 @@ class AutopilotFlight(SitlFlight):
             self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
-            self._hold_during(self._preflight.identify(flight_parameters.values))
+            self._hold_on_rail_during(self._preflight.identify(flight_parameters.values))
             # The program that flew, from the messages that it sent.
             reported, changed = self._link.reported, flight_parameters.changed
             unknown_names = changed.keys() - {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
@@ -101,8 +101,8 @@ class AutopilotFlight(SitlFlight):
 
     def _prepare_program(self) -> None:
         """Upload and start the mission, wait until the motor has thrust, and push the aircraft along the rail."""
-        self._hold_during(self._preflight.prepare(self._mission))
-        self._hold_during(self._wait_for_thrust())
+        self._hold_on_rail_during(self._preflight.prepare(self._mission))
+        self._hold_on_rail_during(self._wait_for_thrust())
         self._push()
 
     def _wait_for_thrust(self) -> ConversationStep:
@@ -111,7 +111,7 @@ class AutopilotFlight(SitlFlight):
         parameters = self.setup.autopilot.parameters
         if take_off is None or take_off.launch.method == "runway" or not isinstance(parameters, ArduPilotParameters):
             return
-        start_time = motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, parameters)
+        start_time = motor_start_time(take_off.acceleration, take_off.speed, take_off.launch.incline, parameters)
         run_up_s = run_up_time(start_time, parameters)
         deadline = self._lockstep.time + (run_up_s + _SPOOL_TIME_S if run_up_s else 0.0)
         while self._lockstep.time < deadline:

@@ -73,7 +73,8 @@ class Preflight(Conversation):
 def version_text(texts: list[str], number: int | None) -> str:
     """Return ArduPlane's name and version.
 
-    They are in ArduPlane's status texts, or else in AUTOPILOT_VERSION.flight_sw_version.
+    texts: status texts of ArduPlane; the first that begins with "ArduPlane" is returned.
+    number: AUTOPILOT_VERSION.flight_sw_version, used without such a text; None if not received.
 
     >>> version_text(["Initialising", "ArduPlane V4.6.0-dev (0123abcd)"], None)
     'ArduPlane V4.6.0-dev (0123abcd)'

@@ -132,7 +132,7 @@ def collect_arduplane_parameters(
 
 
 def with_names_of_4_6(values: Mapping[str, float]) -> dict[str, float]:
-    """Return parameters under their names in 4.7, and under their names in 4.6 where these differ.
+    """Add the 4.6 name, with the same value, for each parameter that 4.7 has renamed.
 
     >>> with_names_of_4_6({"ALT_SLOPE_MIN": 20.0, "WP_RADIUS": 90.0})
     {'ALT_SLOPE_MIN': 20.0, 'WP_RADIUS': 90.0, 'GLIDE_SLOPE_MIN': 20.0}

@@ -133,9 +133,9 @@ def planfly_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a compiled model, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return the code of the flight's end.
 
-    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    The code is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
     block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.

@@ -12,7 +12,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
-from flight.autopilots.file_releases import choose_release_for_file, commented_release
+from flight.autopilots.file_releases import choose_release_for_file, release_in_comments
 from flight.autopilots.gust_height import updraft_altitude_gain
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
@@ -179,7 +179,7 @@ class Px4(Autopilot):
         if table.params is not None:
             file = Path(table.params)
             text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
-            writer_release = commented_release(text, "PX4")
+            writer_release = release_in_comments(text, "PX4")
         version, notes = choose_release_for_file(_VERSIONS, table.px4_version, writer_release, str(table.params), "PX4")
         return cls(Px4Parameters.load(aircraft, table.params, version, notes))
 
@@ -236,7 +236,7 @@ class Px4(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Checks of PX4 before a mission (feasibility checks), from FW_LND_ANG and MIS_TKO_LAND_REQ.
+        """PX4's feasibility checks of a mission, which depend on FW_LND_ANG and MIS_TKO_LAND_REQ.
 
         If the user's file is a complete set of parameters, MIS_TKO_LAND_REQ is treated as stated.
 
@@ -347,11 +347,11 @@ class Px4(Autopilot):
             if return_type in _TO_LANDING and not mission.commands.isdisjoint(landing_commands):
                 landing_text = "may return to the mission's landing, which is not simulated"
                 texts.append(f"RTL_TYPE {return_type:g} {landing_text}")
-            texts += self._describe_unjudged_rtl_settings(mission.rally_distance)
+            texts += self._describe_unsimulated_rtl_parts(mission.rally_distance)
         return texts
 
     def _describe_unsimulated_rtl_type(self, rally_distance: float) -> Iterator[str]:
-        """Describe a value of RTL_TYPE for which no RTL is simulated.
+        """Yield a text if no RTL is simulated with the value of RTL_TYPE, otherwise nothing.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
         """
@@ -361,8 +361,8 @@ class Px4(Autopilot):
         if return_type == _TO_RALLY_POINT and math.isinf(rally_distance):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where the RTL begins, which is not simulated"
 
-    def _describe_unjudged_rtl_settings(self, rally_distance: float) -> Iterator[str]:
-        """Describe settings with which a part of an RTL is not simulated, although the rest of the RTL is.
+    def _describe_unsimulated_rtl_parts(self, rally_distance: float) -> Iterator[str]:
+        """Yield a text for each setting with which a part of an RTL, but not all of it, is not simulated.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
         """
@@ -389,9 +389,10 @@ class Px4(Autopilot):
         )
 
     def _turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the distance before a waypoint at which PX4 turns in still air, for any turn, m.
+        """Return the distance before a waypoint at which PX4 turns to the next leg in still air, m.
 
-        Up to 1.16 the distance grows with altitude.
+        turn: not used, because the distance is the same for all turns.
+        amsl: altitude, m; up to 1.16 the distance grows with it.
         """
         parameters = self.parameters
         if not parameters.uses_switch_distance:
@@ -400,9 +401,11 @@ class Px4(Autopilot):
         return float(self._acceptance_radii(np.array([speed]))[0])
 
     def _acceptance_radii(self, ground_speeds: Floats) -> Floats:
-        """Return the acceptance radii at ground speeds (n,), m/s, up to PX4 1.16, as (n,) m.
+        """Return the acceptance radius of a waypoint at each ground speed in PX4 up to 1.16, m, (n,).
 
         The radius is the switch distance of the guidance, but at least NAV_ACC_RAD.
+
+        ground_speeds: m/s, (n,).
         """
         parameters = self.parameters
         period = parameters["NPFG_PERIOD"]
@@ -484,7 +487,7 @@ class Px4(Autopilot):
             fly=partial(fly_returns, parameters),
             causes=lambda mission: failsafe_causes(parameters, has_fence=mission.has_fence),
             unsimulated_text=self._unsimulated_rtl_reason,
-            unjudged_texts=self._unjudged_rtl_parts,
+            unsimulated_part_texts=self._unsimulated_rtl_parts,
             path_text=path_text,
             trials=ReturnTrials(
                 (return_altitude, descend_altitude | return_altitude),
@@ -503,12 +506,12 @@ class Px4(Autopilot):
             return "landing"
         return next(self._describe_unsimulated_rtl_type(mission.rally_distance), "")
 
-    def _unjudged_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
+    def _unsimulated_rtl_parts(self, mission: ReturnMission) -> tuple[str, ...]:
         """Return texts on the parts of a mission's RTLs that are not simulated."""
         return_type, has_sequence = self.parameters["RTL_TYPE"], any(start.landing for start in mission.landings)
         is_unknown = return_type in _TO_LANDING and not has_sequence and not mission.commands.isdisjoint(LANDINGS)
         landing_text = f"RTL_TYPE {return_type:g} may return to a landing without DO_LAND_START, which is not simulated"
-        return (*([landing_text] if is_unknown else []), *self._describe_unjudged_rtl_settings(mission.rally_distance))
+        return (*([landing_text] if is_unknown else []), *self._describe_unsimulated_rtl_parts(mission.rally_distance))
 
     @property
     def loiters(self) -> LoiterRules:

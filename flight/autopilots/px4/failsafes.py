@@ -37,7 +37,7 @@ _MIN_HOLD_TIME_S = 0.1
 
 
 def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Cause, ...]:
-    """Return the events that can end a mission, each with PX4's reaction, in a fixed order.
+    """Return the events that can end a mission, each as a `Cause` with PX4's reaction, in a fixed order.
 
     has_fence: True if the mission carries a fence.
 
@@ -52,8 +52,8 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
     """
     causes = [
         Cause("the pilot's RTL", "return"),
-        _link_cause(parameters, "control"),
-        _link_cause(parameters, "telemetry"),
+        _link_loss_cause(parameters, "control"),
+        _link_loss_cause(parameters, "telemetry"),
     ]
     battery_action = int(parameters["COM_LOW_BAT_ACT"])
     for name, actions in (("battery critical", _CRITICAL_BATTERY), ("battery emergency", _EMERGENCY_BATTERY)):
@@ -64,8 +64,8 @@ def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Caus
     return tuple(causes)
 
 
-def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
-    """Return the loss of a radio link, with PX4's reaction; the reaction is "on" if PX4 ignores the loss.
+def _link_loss_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
+    """Return the loss of a radio link as a `Cause` with PX4's reaction; "on" if PX4 ignores the loss.
 
     use: "telemetry" for the ground station's link, "control" for the remote control.
     """
@@ -96,7 +96,7 @@ def link_loss_reactions(parameters: Px4Parameters, use: LinkUse) -> tuple[LinkLo
     >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(parameters, "control")]
     [('circle', 0.5), ('return', 5.5)]
     """
-    _, action, parameter, value = _link_cause(parameters, use)
+    _, action, parameter, value = _link_loss_cause(parameters, use)
     if action == "on":
         return (LinkLossReaction(action, math.inf, parameter, value),)
     delay, hold_time = parameters["COM_DL_LOSS_T" if use == "telemetry" else "COM_RC_LOSS_T"], 0.0

@@ -126,9 +126,9 @@ def px4_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to ``count`` ticks with a compiled model, and return a status.
+    """Fly up to ``count`` ticks with a compiled model, and return the code of the flight's end.
 
-    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    The code is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
 
     block: block of a `flight.simulation.tick.Workspace`, with state, settings and path of the flight; updated.
     heights: ground heights of the terrain by pixel, m.
@@ -223,7 +223,7 @@ def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
 def _end_mission(
     estimated: Record, last_waypoint: Record, guidance: Record, parameters: Record, memory: Record, dt: float
 ) -> None:
-    """End the flight once the aircraft is past the last waypoint and near its altitude, or after a timeout.
+    """End the flight once PX4 has passed the last waypoint near its altitude, or after a timeout.
 
     If PX4 loiters indefinitely at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one
     lap of that loiter. A loiter before the last waypoint, in which PX4 corrects the altitude, does not end the flight.

@@ -311,7 +311,7 @@ def climb_before_return(
     parameters: Record,
     memory: Record,
 ) -> bool:
-    """Climb in a loiter where the RTL began; return False once the aircraft is at the return altitude.
+    """Climb in a loiter where the RTL began; return True until the aircraft is at the return altitude.
 
     During the climb ``memory.from_east`` and ``from_north`` are the position at which the RTL began; after it, the
     position at which the climb ended. ``memory.from_up`` always is the altitude at which the RTL began.
@@ -397,11 +397,11 @@ def _navigate_rtl(
 
 @inner
 def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
-    """Make ``leg`` the current leg, and set the start of the line to its end.
+    """Make ``leg`` the current leg, and set the start of the line that the aircraft follows.
 
-    The line starts at the leg's first waypoint. After a loiter it starts at the loiter's center, or at the tangent
-    point on the circle if the item states an exit on the tangent. After a loiter by turns, which PX4 refuses, it starts
-    at the aircraft's position.
+    The line leads to the end of the leg. It starts at the leg's first waypoint. After a loiter it starts at the
+    loiter's center, or at the tangent point on the circle if the item states an exit on the tangent. After a loiter by
+    turns, which PX4 refuses, it starts at the aircraft's position.
 
     estimated: position and velocity over the ground as the navigation estimates them, a `MOTION` record.
     waypoints: `WAYPOINT` records of the route, (w,).

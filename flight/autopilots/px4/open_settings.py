@@ -46,10 +46,10 @@ _GAIN_FACTOR = math.degrees(1.0) / 45.0
 
 
 def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None, *, by_program: bool) -> Iterator[str]:
-    """Describe settings that leave the aircraft without a position, or without proper control.
+    """Yield a sentence for each setting that leaves PX4 without a position, or without attitude control.
 
-    Control is not proper if the controls are not connected, are slowed down, or have gains that are too low or too
-    high. The texts have no full stop.
+    Such settings leave controls unconnected, slow them down, or state gains that are too low or too high. The texts
+    have no full stop.
 
     aircraft: None if the aircraft is not known.
     by_program: True if PX4's own program flies, which uses the gains of the rate controllers.

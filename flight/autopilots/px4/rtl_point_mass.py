@@ -73,6 +73,9 @@ def fly_returns(
     """Simulate the RTL from each of n starts to its target, at FW_AIRSPD_TRIM.
 
     starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
+    targets: n targets; an RTL ends in the loiter of its target, or at the leg to the landing.
+    aircraft: point mass of the aircraft in the wind.
+    environment: terrain and kill spheres from which the clearances are measured.
     store_positions: True to store the flown positions.
     abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
 
@@ -213,6 +216,7 @@ def fly_rtl(
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
     aircraft, excesses, power, field: record and tables of a `flight.autopilots.point_mass.PointMass`.
+    heights, to_pixel, spheres, radii, has_terrain: a `flight.autopilots.simulated_returns.ReturnEnvironment`.
     """
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, PX4_MEMORY)
     progress_records = np.zeros(1, LOITER_PROGRESS)

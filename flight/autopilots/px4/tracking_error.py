@@ -70,7 +70,7 @@ def tracking_error(
     *,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return PX4's deviations from a plan, for which the plan needs margins.
+    """Return PX4's deviations from the legs of a plan, which the plan must allow for.
 
     airspeed: equivalent airspeed, m/s.
     nav: accuracy of navigation.
@@ -138,10 +138,11 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 @lru_cache(maxsize=8)
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the acceptance radius, the excursion, and the affected length of each leg at corners, m.
+    """Return four tables on corners, m: acceptance radius, excursion, affected length before and after.
 
-    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`. The excursion, the
-    greatest distance from the legs, includes the margin for wind.
+    Each table has one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`. The excursion is the greatest
+    distance from the legs, including the margin for wind. The affected lengths are parts of the legs before and after
+    the corner.
     """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     _measure_corners(parameters.record(), airspeed, TURNS, SPEED_RATIOS * airspeed, corners, strided_waypoints(3))

@@ -9,7 +9,7 @@ from flight.autopilots.autopilot import StoredAutopilot
 from flight.autopilots.parts import MissionParts
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4_sitl.process import startup_files
+from flight.autopilots.px4_sitl.process import startup_folder
 from flight.simulation.setup import FlightSetup
 
 
@@ -27,7 +27,7 @@ class Px4Sitl(ProgramAutopilot, Px4):
     @classmethod
     def accepts_program(cls, program: Path) -> bool:
         """Return True if a program's name begins with "px4", or if PX4's start-up files are next to it."""
-        return program.name.lower().startswith("px4") or startup_files(program) is not None
+        return program.name.lower().startswith("px4") or startup_folder(program) is not None
 
     @classmethod
     def with_model(cls, model: Px4, binary: Path) -> Self:

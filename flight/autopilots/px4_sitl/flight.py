@@ -73,7 +73,7 @@ class Px4Flight(SitlFlight):
                 _STALL_TIME_S,
                 _STARTUP_TIMEOUT_S,
             )
-            self._hold_during(self._preflight.identify(flight_parameters.values))
+            self._hold_on_rail_during(self._preflight.identify(flight_parameters.values))
             # The program that flew, from the messages that it sent.
             reported, changed = link.reported, flight_parameters.changed
             unknown_names = changed.keys() - reported.parameters.keys()
@@ -106,7 +106,8 @@ class Px4Flight(SitlFlight):
     def _is_ending(self) -> bool:
         """True if the mission is about to end.
 
-        This is the case once PX4 has reached a last waypoint at which it loiters; otherwise as in the base class.
+        If PX4 loiters at the last waypoint, the mission ends once it has reached this waypoint. For other missions the
+        base class decides.
         """
         ends_in_circle = self._workspace.path["waypoint"]["is_mission_end"][self.setup.route.legs]
         return self._link.reported.reached >= self.last_item if ends_in_circle else super()._is_ending
@@ -120,8 +121,8 @@ class Px4Flight(SitlFlight):
         return super().save_log(target)
 
     def _prepare_program(self) -> None:
-        """Upload the mission, push the aircraft along the rail, and start the mission meanwhile."""
-        self._hold_during(self._preflight.prepare(self._mission))
+        """Upload the mission, and start it while the aircraft is pushed along the rail."""
+        self._hold_on_rail_during(self._preflight.prepare(self._mission))
         self._push(end_fraction=_MODE_START_FRACTION)
         # PX4 confirms the mode while the aircraft moves on.
         self._mode_start = self._preflight.start_mission()

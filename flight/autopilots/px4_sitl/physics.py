@@ -55,12 +55,12 @@ _RATE_NOISE_RADPS = 1.5e-3
 _PRESSURE_NOISE_HPA = 5e-3
 
 
-def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
+def earth_magnetic_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
     """Return the Earth's magnetic field (north, east, down) at a position, gauss, from pymavlink's tables.
 
     lat_deg, lon_deg: degrees.
 
-    >>> north, east, down = earth_field(47.4, 8.5)
+    >>> north, east, down = earth_magnetic_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
     (0.22, True, 0.43)
     """
@@ -70,7 +70,7 @@ def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
     return horizontal * math.cos(declination), horizontal * math.sin(declination), strength * math.sin(inclination)
 
 
-def atmosphere(amsl: float) -> tuple[float, float, float]:
+def standard_atmosphere(amsl: float) -> tuple[float, float, float]:
     """Return pressure (Pa), temperature (K) and density (kg/m^3) of the standard atmosphere (ISO 2533).
 
     At sea level it has 288.15 K and 101325 Pa. The temperature falls by 6.5 K per km, and 287.05287 J/(kg K) is the gas
@@ -78,7 +78,7 @@ def atmosphere(amsl: float) -> tuple[float, float, float]:
 
     amsl: m.
 
-    >>> [round(value, 3) for value in atmosphere(1000.0)]
+    >>> [round(value, 3) for value in standard_atmosphere(1000.0)]
     [89874.563, 281.65, 1.112]
     """
     temperature = 288.15 - 0.0065 * amsl
@@ -94,14 +94,14 @@ class Sensors:
 
     def __init__(self, home: Home) -> None:
         self._home = (math.radians(home.lat_deg), math.radians(home.lon_deg), home.alt)
-        self._field = earth_field(home.lat_deg, home.lon_deg)
+        self._field = earth_magnetic_field(home.lat_deg, home.lon_deg)
         self._random = random.Random(1)
 
     def sensor_message(self, motion: BodyMotion) -> Any:
         """Return HIL_SENSOR: readings of the inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
         field = to_body_axes((motion.roll, motion.pitch, motion.yaw), self._field)
-        pressure, temperature, density = atmosphere(self._home[2] - motion.down)
+        pressure, temperature, density = standard_atmosphere(self._home[2] - motion.down)
         return mavlink.MAVLink_hil_sensor_message(
             round(motion.time * 1e6),
             motion.force_x + dither(-_FORCE_NOISE_MPS2, _FORCE_NOISE_MPS2),
@@ -325,9 +325,10 @@ class HilLockstep(Lockstep):
         self._awaits_answer = False
 
     def _next_outputs(self) -> tuple[float, ...]:
-        """Return the last answer of PX4; zeros before the first answer.
+        """Return PX4's outputs after the last step; without an answer, the previous outputs.
 
-        If PX4 answers every step, the answer to the last step is awaited; otherwise only for `_EARLY_ANSWER_TIMEOUT_S`.
+        Before the first answer the outputs are zeros. Once PX4 answers every step, wait for the answer. Before that,
+        wait at most `_EARLY_ANSWER_TIMEOUT_S`.
         """
         if self._awaits_answer:
             # A running PX4 answers every step.
@@ -366,7 +367,7 @@ class HilLockstep(Lockstep):
                 self.step_on_rail(rail)
 
     def _next_commands(self) -> Commands:
-        """Return the commands from the latest outputs that PX4 has sent (first step of the last frame); do not wait."""
+        """Return the commands that PX4 sent after the first step of the last frame, without waiting."""
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.value_at_fraction(outputs[ELEVATOR]),

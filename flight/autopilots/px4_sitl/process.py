@@ -22,7 +22,7 @@ _TEMPORARY_FOLDER = Path("/tmp")
 _TEMPORARY_PREFIXES = ("px4_lock-", "px4-sock-")
 
 
-def startup_files(program: Path) -> Path | None:
+def startup_folder(program: Path) -> Path | None:
     """Return the folder of a program's start-up files, or None without one."""
     folder = program.resolve().parent
     candidates = (folder / STARTUP, folder.parent / STARTUP)
@@ -41,7 +41,7 @@ def px4_launch(
 
     Raises FlightError if the program has no start-up files.
     """
-    source = startup_files(binary)
+    source = startup_folder(binary)
     if source is None:
         allowed = f"expected PX4's start-up files next to the program, in the folder {STARTUP} of its build"
         raise FlightError(f"{binary}: {allowed}", file=binary, field=STARTUP, allowed=allowed)
@@ -53,14 +53,16 @@ def px4_launch(
             ". ${R}etc/init.d/rc.fw_defaults",
             *(f"param set {parameter} {value:.9g}" for parameter, value in parameters.items()),
         ]
-        _write(scripts / "airframes" / f"{_AIRFRAME_ID}_planfly", *lines)
-        _write(
+        _write_script(scripts / "airframes" / f"{_AIRFRAME_ID}_planfly", *lines)
+        _write_script(
             scripts / "px4-rc.simulator",
             "param set MAV_SYS_ID 1",
             "param set IMU_INTEG_RATE 250",
             f"simulator_mavlink start -c {simulator_port}",
         )
-        _write(scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f")
+        _write_script(
+            scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f"
+        )
         environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME_ID), "PX4_SIM_MODEL": "planfly"}
         # Each instance of PX4 on a machine needs its own number: the port number is unique.
         leftover_files = tuple(_TEMPORARY_FOLDER / f"{name}{simulator_port}" for name in _TEMPORARY_PREFIXES)
@@ -69,7 +71,7 @@ def px4_launch(
     return prepare
 
 
-def _write(file: Path, *lines: str) -> None:
+def _write_script(file: Path, *lines: str) -> None:
     """Write a shell script of the given lines."""
     file.parent.mkdir(exist_ok=True)
     file.write_text("\n".join(("#!/bin/sh", *lines, "")), encoding="utf-8")

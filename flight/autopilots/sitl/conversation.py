@@ -47,17 +47,16 @@ _MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_M
 
 
 class _Stopwatch:
-    """Stopwatch that starts when it is created, in the autopilot's time and by the clock."""
+    """Stopwatch of the autopilot's time and of real time, which starts when it is created."""
 
     def __init__(self, now: Callable[[], float], clock: Callable[[], float]) -> None:
         self._now, self._clock = now, clock
         self._start_times = now(), clock()
 
     def has_passed(self, seconds: float) -> bool:
-        """Return True if more than a time has passed by the autopilot's clock, and enough real time too.
+        """Return True if more than ``seconds`` s of the autopilot's time have passed.
 
-        seconds: time by the autopilot's clock, s. In real time as much must have passed, but at most
-            `_MIN_REAL_TIME_S`.
+        In addition, ``seconds`` or `_MIN_REAL_TIME_S`, whichever is less, must have passed in real time.
         """
         start, clock_start = self._start_times
         return self._now() - start > seconds and self._clock() - clock_start > min(seconds, _MIN_REAL_TIME_S)

@@ -100,7 +100,9 @@ _EARTH_RADIUS_M = 6_371_000.0
 
 @dataclass(frozen=True, slots=True)
 class RailEnd:
-    """End of the rail, and the aircraft's motion there: trimmed level flight, or a launch.
+    """End of the rail along which the aircraft is accelerated, and its motion there.
+
+    The motion is trimmed level flight, or a launch.
 
     lat, lon: rad.
     amsl: m.
@@ -132,7 +134,7 @@ class RailEnd:
 
 
 def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
-    """Return the level rail that ends where the aircraft is in trimmed flight.
+    """Return the end of a level rail that accelerates the aircraft to its trimmed flight.
 
     state: state of the trimmed flight, a record of `flight.dynamics.state.STATE`.
     wind: mean wind north, east and down, m/s.

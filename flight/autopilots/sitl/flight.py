@@ -303,7 +303,7 @@ class SitlFlight(ProgramFlight):
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Upload and start the mission, and fly the aircraft to the first waypoint, or launch it for a take-off.
+        """Upload and start the mission, and bring the aircraft to the first waypoint or to its launch.
 
         Raises FlightError, see the class.
         """
@@ -358,7 +358,7 @@ class SitlFlight(ProgramFlight):
             is_named = str(error).startswith(str(self._binary))
             raise error_class.from_error(error, "" if is_named else self._binary) from error
 
-    def _hold_during(self, step: ConversationStep) -> None:
+    def _hold_on_rail_during(self, step: ConversationStep) -> None:
         """Hold the aircraft at rest on the rail during a step of the conversation with the program."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
@@ -381,9 +381,9 @@ class SitlFlight(ProgramFlight):
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
     def _set_unit_factors(self) -> None:
-        """Copy unit conversions from JSBSim into the workspace, for the compiled ticks.
+        """Copy the factors between JSBSim's units and SI units into the workspace, for the compiled ticks.
 
-        These are the factors of the state's values, and of each output for positive and for other values.
+        Each value of the state has one factor. Each output has two factors: for positive values, and for other values.
         """
         access = self.fdm.loop_access()
         self._work.state_factors = access.factors[0]
@@ -400,7 +400,7 @@ class SitlFlight(ProgramFlight):
         )
 
     def _tick(self, tick: "partial[int]", has_gnss_error: bool) -> int:
-        """Run one tick; if there is a GNSS error, update the error of the next frames. Return the end code or 0."""
+        """Run one tick, and update the GNSS error (if any) of the next frames; return the end code or 0."""
         status = tick()
         if has_gnss_error:
             east, north, up, velocity_east, velocity_north, velocity_up = self._workspace.navigation_error()

@@ -19,7 +19,7 @@ _MAX_RECEIVE_BYTES = 65536
 
 @dataclass(slots=True)
 class ReportedState:
-    """State that an autopilot has reported by MAVLink; None, -1 or empty until it sends the message concerned.
+    """State that an autopilot has reported by MAVLink; None, -1 or empty before it is reported.
 
     vehicle: MAV_TYPE.
     autopilot: MAV_AUTOPILOT.

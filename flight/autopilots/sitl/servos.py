@@ -21,7 +21,7 @@ _MAX_OUTPUT = 32
 
 @dataclass(frozen=True, slots=True)
 class ServoOutput:
-    """One servo of a control: the control is linear in the pulse between the knots, and constant beyond them.
+    """One servo of a control, which is linear in the pulse between knots, and constant beyond them.
 
     number: number of the output, from 1.
     pulses: (k,) microseconds, increasing.

@@ -437,7 +437,7 @@ class ReturnWorld:
             parts.append("law")
         if any(cause.action == "autoland" for cause in self.causes):
             parts.append("autoland")
-        parts += behaviour.unjudged_texts(self.mission)
+        parts += behaviour.unsimulated_part_texts(self.mission)
         begins_with_landing = any(landing.is_landing for landing in self.landings)
         if begins_with_landing and any(ending != "circle" for ending in self.endings):
             parts.append("landing")
