@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 import planfly
-from logs.verdict.returns.drawn_returns import drawn_returns
+from logs.verdict.returns.drawn_returns import collect_drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts
@@ -81,7 +81,7 @@ def main() -> None:
     )
     glides, without = timed("glides from there", lambda: judge_glides(world, starts))
     _, drawn = timed(
-        "what is drawn of them, but for the drawing", lambda: drawn_returns(world, starts, returns, glides)
+        "what is drawn of them, but for the drawing", lambda: collect_drawn_returns(world, starts, returns, glides)
     )
     begun = perf_counter()
     rally = suggest_rally_points(world, starts)

@@ -93,9 +93,9 @@ def example_log() -> FlightLog:
 
 
 def write_example_log(path: Path) -> Path:
-    """Record the flight of `example_log` in a file, which is replaced if it exists, and return its path.
+    """Record the flight of `example_log` in a file, and return the file's path.
 
-    Raises OSError if the file cannot be written.
+    An existing file is replaced.  Raises OSError if the file cannot be written.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -112,7 +112,7 @@ def write_example_log(path: Path) -> Path:
 
 
 def _track() -> Track:
-    """Return a track along the waypoints at constant speed, with the nose along the leg and level wings."""
+    """Return a track along the waypoints at constant speed, with wings level and heading along each leg."""
     leg_vectors = np.diff(_WAYPOINTS, axis=0)
     lengths = np.sqrt((leg_vectors**2).sum(axis=1))
     waypoint_distances = np.concatenate([[0.0], np.cumsum(lengths)])

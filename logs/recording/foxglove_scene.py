@@ -146,9 +146,10 @@ def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
 
 
 def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return the vertices of the ground's mesh, m, their colours, 0 to 1, and a mask of vertices with known height.
+    """Return the vertices of the ground's mesh, their colours, and a mask of vertices with known height.
 
-    Vertices and colours have shape (n, m, 3), the mask (n, m).  A vertex of unknown height has the lowest known height.
+    Vertices (m) and colours (0 to 1) have shape (n, m, 3), the mask has shape (n, m).  Vertices of unknown height are
+    placed at the lowest known height.
 
     bounds: range of the area to the east and to the north, m, (2, 2).
     """
@@ -171,7 +172,10 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
-    """Return the vertices of the ground's mesh that have a known height, m, and their colours, 0 to 1, (n, 3) each."""
+    """Return the ground's mesh as points: positions (m) and colours (0 to 1), (n, 3) each.
+
+    Vertices of unknown height are left out.
+    """
     if scenario.terrain is None:
         return np.zeros((0, 3)), np.zeros((0, 3))
     points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
@@ -179,7 +183,10 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
-    """Encode the spheres of missiles and radars as a SceneUpdate, with their names above the ground around them."""
+    """Encode the spheres of missiles and radars as a SceneUpdate, each with a label of its name.
+
+    terrain: ground that the labels must not touch; None without terrain.
+    """
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         center = threats.position[k]
@@ -197,7 +204,7 @@ def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> by
 
 
 def _label_position(position: Floats, terrain: Terrain | None) -> Floats:
-    """Return a label's position above a point and the highest known ground around it, m, (3,)."""
+    """Return the position of a point's label, m, (3,): above the point and all known ground near it."""
     east, north, up = (float(value) for value in position)
     top_altitude = up
     if terrain is not None:
@@ -452,7 +459,10 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """Encode the aircraft model as a SceneUpdate in the aircraft's frame, which the log's transforms move."""
+    """Encode the aircraft model as a SceneUpdate in the aircraft's frame.
+
+    The log's transform messages move this frame with the aircraft.
+    """
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=MODEL_SPAN_M, y=MODEL_SPAN_M, z=MODEL_SPAN_M),
@@ -471,7 +481,7 @@ def aircraft_scene(time_ns: int) -> bytes:
 
 
 def layout_text() -> str:
-    """Return the layout file for Foxglove that ships with the package, as JSON text.
+    """Return the JSON text of the package's layout file for Foxglove.
 
     >>> import json
     >>> sorted(json.loads(layout_text()))

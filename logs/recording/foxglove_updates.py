@@ -79,7 +79,7 @@ class GrowingTrack:
 
 
 def thin_line(points: Floats, point_count: int) -> Floats:
-    """Thin the points (n, 3) of a line to `point_count` points, and keep its ends.
+    """Reduce the points of a line, (n, 3), to `point_count` points; the ends of the line are kept.
 
     Repeatedly drops the points that are nearest to the straight line between their neighbours.
 
@@ -242,7 +242,7 @@ def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.ui
 
 
 def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the vertices of the ground's mesh that have a known height as a point cloud."""
+    """Encode the ground as a point cloud of the mesh vertices with known height."""
     points, colours = terrain_points(scenario)
     shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
     return point_cloud(time_ns, MAP_FRAME, points, shades)
@@ -446,8 +446,9 @@ class ViewerMessages:
 
 
 def _change_indices(values: Ints, previous: int) -> Ints:
-    """Return the indices at which non-decreasing values increase.
+    """Return the indices of the values that are larger than the value before them.
 
-    previous: value to which the first value is compared.
+    values: values that never decrease.
+    previous: value before the first one.
     """
     return np.flatnonzero(np.diff(values, prepend=previous) > 0)

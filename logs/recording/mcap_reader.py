@@ -66,7 +66,7 @@ def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
     `Container.problem` then describes it.
 
     file: file, positioned after the magic at its start.
-    container: empty container, which is complete once all chunks have been read.
+    container: empty container; it is complete after the last chunk has been yielded.
     """
     crc = zlib.crc32(MAGIC)
     total = 0
@@ -111,11 +111,12 @@ def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
-    """Check the rest of the data section by its CRC before its records outside chunks are used.
+    """Read ahead to the end of the data section and check its CRC, then restore the file's position.
 
-    The file's position is restored.  Raises _Damage if the CRC differs or the section is damaged.
+    Records outside chunks have no CRC of their own, so this check comes before their use.  Raises _Damage if the CRC
+    differs or the section is damaged.
 
-    crc: CRC of the section up to byte `start`; the part after it is read twice.
+    crc: CRC of the section up to byte `start`, at which the reading starts.
     """
     resume_position = file.tell()
     file.seek(start)

@@ -170,7 +170,7 @@ class ContainerWriter:
         return new_records
 
     def copy_chunk(self, data: bytes) -> None:
-        """Write the records of another file's chunk as a chunk of this file.
+        """Copy a chunk of another file to this file.
 
         The chunk's schemas and channels are added to this file.  Raises one of
         `logs.recording.mcap_reader.PARSE_ERRORS` for records that cannot be read.
@@ -274,7 +274,7 @@ class ContainerWriter:
 
 
 def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
-    """Return a copy of a write error that names the file, because the error of a full disk, for example, names none."""
+    """Return a copy of a write error that names the file; some errors, such as a full disk, name none."""
     return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
@@ -458,7 +458,7 @@ def _merge_by_time(
     row_length, row_channel: size in bytes and channel of each row's message.
     other_messages: messages in order of time, (m,) of `ENTRY`.
     prefix_size: size of the bytes before the first message of the first chunk.
-    limit: largest size of a chunk of several messages, bytes.
+    limit: maximum size of a chunk with more than one message, bytes.
     """
     count = len(row_times) + len(other_messages)
     merged = np.empty(count, dtype=ENTRY)
@@ -521,7 +521,7 @@ def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) ->
 def _index_messages(
     entries: Entries, firsts: Ints, prefix_size: int, max_channel: int
 ) -> tuple[Bytes, Chunks, ChannelIndexes]:
-    """Encode a message index record for each chunk and each channel with messages in it.
+    """Encode the message index records: one per chunk, for each channel with messages in this chunk.
 
     Return the bytes of these records, and the arrays `chunks` and `channels` of `Layout`.
 
@@ -602,13 +602,13 @@ def lay_out_chunks(
 
 @compiled
 def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
-    """Return the log time of the last of some rows, ns, or an error code if the times are invalid.
+    """Check the times of new rows, and return the log time of the last row, ns, or an error code.
 
     Return `OUT_OF_RANGE` if a time is negative or not below `max_time` (s), and `NOT_INCREASING` if a time is not later
     than the previous one.
 
     times: times of the rows, s, (n,).
-    newest: log time of the row before the first, ns.
+    newest: log time of the previously recorded row, ns.
     epoch: log time at simulation time 0, ns.
     """
     for k in range(len(times)):

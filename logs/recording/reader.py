@@ -370,9 +370,7 @@ def read_log(path: Path | str) -> FlightLog:
 
 
 def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords, str]:
-    """Return the rows before the first invalid row, and a text on what is wrong with that row.
-
-    The text is "" if all rows are valid.
+    """Return the rows before the first invalid row, and a text on this row's fault, or "" without one.
 
     waypoint_count: number of the route's waypoints, which the legs of the rows must not exceed.
     """
@@ -394,9 +392,9 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return the reason for the flight's end (None if unknown), and a text on what is wrong with the result, or "".
+    """Return why the flight ended (None if unknown), and a text on an invalid result ("" if it is valid).
 
-    row_count: number of rows in the log, which the result must state, too.
+    row_count: number of rows in the log; a result that states another number is invalid.
     """
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"

@@ -190,9 +190,9 @@ class Recorder:
 
     @contextlib.contextmanager
     def _uninterrupted_write(self) -> Iterator[None]:
-        """Delay signals until the end of the block, and name the file in its errors.
+        """Delay signals until the end of the block, and add the file's name to its OSErrors.
 
-        The OSError of a full disk, for example, names no file.
+        Some of them, such as the error of a full disk, name no file.
         """
         try:
             with delay_signals():
@@ -203,7 +203,7 @@ class Recorder:
             raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def write(self, block: Track) -> None:
-        """Record a block of a track's rows, as `write_rows` does."""
+        """Record the rows of a track, as `write_rows` does."""
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Rows) -> None:
@@ -352,7 +352,7 @@ class Recorder:
             self._writer.write_end()
 
     def _write_attachment(self, name: str, data: bytes, log_time: int) -> None:
-        """Write an attachment; the suffix of its name determines its media type."""
+        """Write an attachment, with the media type that belongs to the suffix of its name."""
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
@@ -379,7 +379,7 @@ class Recorder:
     ) -> None:
         """Write rows and other messages in chunks, in order of time; at equal times, a row comes after other messages.
 
-        other_messages: message records of other channels than the rows' channel.
+        other_messages: message records of all channels except the channel of the rows.
         log_times: log time of each row, ns, (t,).
         """
         channel = self._channels[STATE_TOPIC]
@@ -410,7 +410,7 @@ class Recorder:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return the rows of a track that a `Recorder` with a stride records: every n-th row, and the last row.
+    """Return every n-th row of a track and its last row: the rows that a `Recorder` with stride n records.
 
     every: stride n; with 1 or less, the track is returned unchanged.
 

@@ -79,7 +79,7 @@ def heights_name(part: int) -> str:
 
 
 def media_type(name: str) -> str:
-    """Return the media type of an attachment by the suffix of its name."""
+    """Return the media type that belongs to the suffix of an attachment's name."""
     return _MEDIA_TYPES[PurePath(name).suffix]
 
 
@@ -114,7 +114,10 @@ class _TerrainFile(SetupModel):
 
 
 def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
-    """Encode the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights without loss, in parts."""
+    """Encode the terrain as attachments, and return their bytes by name.
+
+    They are `TERRAIN_FILE`, and the heights in one or more parts, compressed without loss.
+    """
     rows, cols = terrain.heights.shape
     parts = {}
     compressor = zstandard.ZstdCompressor(level=3)
@@ -143,9 +146,9 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
 def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     """Rebuild the terrain from its attachments, bit for bit.
 
-    Raises LogError for heights that are missing, damaged or of wrong size, and for an invalid map to pixels.
+    Raises LogError for missing, damaged or wrongly sized heights, and for an invalid conversion from map to pixels.
 
-    attachments: attachments of the log, bytes by name, which include those from `pack_terrain`.
+    attachments: bytes of all attachments of the log by name, including the attachments from `pack_terrain`.
     source: name of the log for messages.
     """
     try:
@@ -196,7 +199,10 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    """Divide the rows of the terrain's heights among attachments; return first row and row after the last of each."""
+    """Divide the rows of the terrain's heights into one block per attachment.
+
+    Return the range of rows of each block, as the first row and the row after the last.
+    """
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
@@ -253,7 +259,7 @@ class _ForecastFile(SetupModel):
 
 
 def pack_forecast(wind: Wind) -> dict[str, bytes]:
-    """Encode the weather forecast of a wind as attachments, bytes by name; {} for a wind without a forecast."""
+    """Encode a wind's forecast as attachments, bytes by name; return {} for a wind without one."""
     if wind.forecast is None:
         return {}
     numbers = np.empty(0) if wind.field is None else wind.field.packed()
@@ -265,7 +271,7 @@ def pack_forecast(wind: Wind) -> dict[str, bytes]:
 
 
 def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind, *, is_in_forecast: bool) -> Wind:
-    """Return the wind with the forecast that a log's attachments contain; unchanged if they contain none.
+    """Add the forecast in a log's attachments to a wind; return the wind unchanged if they contain none.
 
     Raises LogError for an attachment that is missing or has the wrong content.
 
@@ -329,7 +335,7 @@ class StoredSetup:
 
 @functools.cache
 def _cached_versions() -> tuple[tuple[str, str], ...]:
-    """Return the versions of Python and of the installed packages of `_PACKAGES`, which are looked up only once."""
+    """Look up the versions of Python and of the installed packages of `_PACKAGES`; the result is cached."""
     versions = [("python", platform.python_version())]
     for name in _PACKAGES:
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -338,7 +344,7 @@ def _cached_versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that affect a log by arithmetic or format.
+    """Return the versions of Python and of the packages whose arithmetic or formats affect a log.
 
     Packages that are not installed are left out.
 
@@ -350,7 +356,7 @@ def package_versions() -> dict[str, str]:
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
-    """Encode a setup as attachments for a log, bytes by name, `SETUP_FILE` first.
+    """Encode a setup as attachments for a log, and return their bytes by name, `SETUP_FILE` first.
 
     The same setup and packages give the same bytes.
     """
@@ -438,7 +444,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     stored_autopilot = StoredAutopilot(
         file.guidance,
         None if file.parameters is None else read_parameters(file.parameters),
-        None if file.program is None else file.program.program(),
+        None if file.program is None else file.program.to_program(),
         file.autopilot_version or "",
     )
     try:
@@ -447,11 +453,11 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         raise LogError(f"{file_name}: parameters.values: {error}", file=file_name, field="parameters.values") from error
     except KeyError as error:
         raise LogError.at(file_name, "autopilot", file.autopilot, "not an autopilot of this version") from error
-    envelope = file.envelope.envelope(file_name)
+    envelope = file.envelope.to_envelope(file_name)
     setup = FlightSetup(
         scenario=scenario,
-        mission=file.mission.mission(),
-        route=file.route.route(file_name),
+        mission=file.mission.to_mission(),
+        route=file.route.to_route(file_name),
         limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),
         aircraft=file.aircraft,
         battery=file.battery_wh,
@@ -483,7 +489,7 @@ def _finite_or_text(data: Any) -> Any:
 
 
 def _read_json(attachments: dict[str, bytes], name: str, source: str, terrain: Terrain | None) -> tuple[str, Any]:
-    """Return the text and the parsed value of the scenario's or the plan's attachment.
+    """Return the JSON text and the parsed value of the attachment with the scenario or the plan.
 
     Raises LogError if it is missing, not JSON, or needs terrain although the log has none.
 

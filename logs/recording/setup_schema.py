@@ -55,11 +55,11 @@ class SetupModel(BaseModel):
 
     @classmethod
     def from_dataclass(cls, value: object) -> Self:
-        """Make a table from an object of the dataclass that it stores."""
+        """Make a table from an object of the dataclass whose fields it stores."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def field_error(self, file: str, field: str, message: str) -> LogError:
-        """Return the error for an invalid field, whose message names the field by its key in the file.
+        """Make the error for an invalid field; its message names the field by its key in the file.
 
         file: name of the log for the message.
         field: name of the field in the dataclass.
@@ -69,9 +69,9 @@ class SetupModel(BaseModel):
 
 
 def _make_from_table(data_class: type[Data], table: SetupModel, **replacements: Any) -> Data:
-    """Make an object of a dataclass from the values of a table.
+    """Convert a table to an object of a dataclass.
 
-    replacements: values by field name that replace those of the table.
+    replacements: values of fields, by name, that replace the table's values.
     """
     return data_class(**(dict(table) | replacements))
 
@@ -117,8 +117,8 @@ class _SurveyPlan(SetupModel):
     stated_photo: Annotated[Finite, Field(ge=0.0, alias="stated_photo_m")] = 0.0
     height: Annotated[Finite, Field(ge=0.0, alias="height_m")] = 0.0
 
-    def plan(self) -> SurveyPlan:
-        """Return the survey plan of the table."""
+    def to_plan(self) -> SurveyPlan:
+        """Convert the table to a `SurveyPlan`."""
         return _make_from_table(
             SurveyPlan, self, camera=None if self.camera is None else _make_from_table(Camera, self.camera)
         )
@@ -136,11 +136,11 @@ class MissionTable(SetupModel):
     source: str
     survey_plans: tuple[_SurveyPlan, ...] = ()
 
-    def mission(self) -> Mission:
-        """Return the mission of the table."""
+    def to_mission(self) -> Mission:
+        """Convert the table to a `Mission`."""
         lists = {"items": self.items, "fences": self.fences, "rally": self.rally}
         items = {name: tuple(_make_from_table(MissionItem, item) for item in table) for name, table in lists.items()}
-        plans = tuple(plan.plan() for plan in self.survey_plans)
+        plans = tuple(plan.to_plan() for plan in self.survey_plans)
         home = None if self.home is None else _make_from_table(Home, self.home)
         return _make_from_table(Mission, self, home=home, survey_plans=plans, **items)
 
@@ -175,15 +175,15 @@ class RouteTable(SetupModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _columns_of_points(cls, value: Any) -> Any:
-        """Return the fields of a `Route` by name, its points as columns; return other values unchanged."""
+    def _route_to_columns(cls, value: Any) -> Any:
+        """Convert a `Route` to a dictionary with its points as columns; return other values unchanged."""
         if not isinstance(value, Route):
             return value
         columns = {name: value.points[name] for name in field_names(ROUTE_POINT)} | {"airspeed": value.leg_airspeeds}
         return columns | {field.name: getattr(value, field.name) for field in fields(value) if field.name != "points"}
 
-    def route(self, file: str) -> Route:
-        """Return the route of the table.
+    def to_route(self, file: str) -> Route:
+        """Convert the table to a `Route`.
 
         Raises LogError for inconsistent columns, and for a leg without horizontal length.
 
@@ -241,8 +241,8 @@ class EnvelopeTable(SetupModel):
     bank_guessed: bool = False
     climb_shortfall: Annotated[Finite, Field(alias="climb_shortfall_rad", ge=0.0)] = 0.0
 
-    def envelope(self, file: str) -> Envelope:
-        """Return the envelope of the table.
+    def to_envelope(self, file: str) -> Envelope:
+        """Convert the table to an `Envelope`.
 
         Raises LogError for tables of inconsistent shape, and for an axis that does not increase.
 
@@ -276,7 +276,7 @@ class ParametersTable(SetupModel):
 
 
 def parameters_table(parameters: StoredParameters) -> ParametersTable:
-    """Return the parameters of an autopilot as a table."""
+    """Convert an autopilot's parameters to a table."""
     return ParametersTable(
         values={name: value for name, value, _ in parameters.values},
         origins={name: origin for name, _, origin in parameters.values},
@@ -286,7 +286,7 @@ def parameters_table(parameters: StoredParameters) -> ParametersTable:
 
 
 def read_parameters(table: ParametersTable) -> StoredParameters:
-    """Return the parameters of an autopilot from a table, without a check; the autopilot checks them."""
+    """Convert a table to an autopilot's parameters; the values are not checked here."""
     values = (ParameterValue(name, value, table.origins.get(name, "default")) for name, value in table.values.items())
     return StoredParameters(tuple(values), table.unused, table.source)
 
@@ -300,6 +300,6 @@ class ProgramTable(SetupModel):
     changed: dict[str, Finite]
     unused: tuple[str, ...]
 
-    def program(self) -> AutopilotProgram:
-        """Return the autopilot program of the table."""
+    def to_program(self) -> AutopilotProgram:
+        """Convert the table to an `AutopilotProgram`."""
         return _make_from_table(AutopilotProgram, self)

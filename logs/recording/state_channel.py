@@ -39,12 +39,12 @@ _LENGTH_DELIMITED = 2
 
 
 def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return numpy fields for named doubles, each with a one-byte field `tag_<name>` before it for its protobuf tag."""
+    """Return numpy fields for doubles, each preceded by a one-byte field `tag_<name>` for its protobuf tag."""
     return [field for name in names for field in ((f"tag_{name}", "u1"), (name, "<f8"))]
 
 
 def submessage_dtype(names: Sequence[str]) -> np.dtype[np.void]:
-    """Return the numpy type of a submessage of doubles: tag, size, and the tagged doubles."""
+    """Return the numpy type of a protobuf submessage: tag, size, and a tagged double for each name."""
     return np.dtype([("tag", "u1"), ("size", "u1"), *tagged_doubles(names)])
 
 
@@ -71,7 +71,7 @@ def fill_submessages(out: Encoded, field_number: int, names: Sequence[str], valu
 
 
 def repeated_submessages(field_number: int, names: Sequence[str], values: Floats) -> bytes:
-    """Encode rows of values (n, m) as a repeated field of submessages of m doubles each."""
+    """Encode n rows of m doubles, (n, m), as a repeated protobuf field with one submessage per row."""
     messages: Encoded = np.zeros(len(values), dtype=submessage_dtype(names))
     fill_submessages(messages, field_number, names, values)
     return messages.tobytes()
@@ -126,7 +126,7 @@ class StateField(NamedTuple):
     component: int | None
 
     def select(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the column of this field from the values (t,) or (t, n) of the track's field."""
+        """Select this field's column, (t,), from the values of the track's field, (t,) or (t, n)."""
         return values if self.component is None else values[:, self.component]
 
 
@@ -186,7 +186,7 @@ RECORD = np.dtype(
 
 
 def state_class() -> "type[Message]":
-    """Return the protobuf class of a state message, from a descriptor pool of its own."""
+    """Build the protobuf class of a state message in a separate descriptor pool."""
     pool = descriptor_pool.DescriptorPool()
     pool.Add(STATE_FILE)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(STATE_NAME))
@@ -198,7 +198,7 @@ def state_schema() -> bytes:
 
 
 def file_descriptor_set(descriptor: "Descriptor") -> bytes:
-    """Return the serialized FileDescriptorSet of a message type; each file comes after the files that it imports."""
+    """Return the serialized FileDescriptorSet of a message type, imported files first."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: "FileDescriptor") -> None:
@@ -269,7 +269,7 @@ def decode_rows(records: StateRecords) -> Track:
 
 
 def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
-    """Parse one state message in any layout that protobuf allows; return it as (1,) of `RECORD`.
+    """Parse a state message in any layout that protobuf allows to an array (1,) of `RECORD`.
 
     Raises google.protobuf.message.DecodeError for an invalid message.
 

@@ -152,7 +152,7 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
-    """Return the line on aircraft and airspeed, and the line on weather, navigation, terrain and zones."""
+    """Return two lines: one on aircraft and airspeed, and one on weather, navigation, terrain and zones."""
     speed = (
         f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
@@ -197,7 +197,7 @@ def condition_lines(conditions: Conditions) -> list[str]:
 
 
 def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
-    """Return a line of text that names the autopilot.
+    """Return the line that names the autopilot.
 
     is_flown: True if the autopilot flew, False if only a mission is judged.
     """
@@ -255,7 +255,7 @@ def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
 
 
 def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the smallest distance between two side-by-side legs k and k + 2, m, and the number k.
+    """Find the smallest distance between two side-by-side legs k and k + 2; return it, m, and k.
 
     Legs lie side by side if their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`, and at least half of
     the shorter leg lies next to the longer one.  Legs on the same line (`_SAME_LINE_DISTANCE_M`) are left out.  Return

@@ -122,13 +122,13 @@ class VerdictDocument(DocumentConfig):
 
 
 def finding_document(finding: Finding) -> FindingDocument:
-    """Return a finding as a document, including the texts of its place, passing values and suggestions."""
+    """Convert a finding to a document, with its place, its passing values and its suggestions as texts."""
     data = {field.name: getattr(finding, field.name) for field in fields(finding)}
     return FindingDocument(**data, where=finding.where, passes=finding.limit_text, suggestion=finding.suggestion)
 
 
 def level_document(level: LevelAnswer) -> LevelDocument:
-    """Return a level's answer as a document, including the texts of its disagreements with the verdict."""
+    """Convert the answer of a level to a document, with its disagreements with the verdict as texts."""
     return LevelDocument(
         name=level.name,
         flyable=level.flyable,
@@ -140,13 +140,13 @@ def level_document(level: LevelAnswer) -> LevelDocument:
 
 
 def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
-    """Return the deciding parameter as a document, including the sentence that describes it."""
+    """Convert the deciding parameter to a document, with a sentence that describes it."""
     data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
     return DecidingDocument(**data, text=deciding_text(deciding))
 
 
 def parameters_document(parameters: Parameters) -> ParametersDocument:
-    """Return the autopilot's parameters as a document.
+    """Convert the autopilot's parameters to a document.
 
     It lists values with their origins, names in the file that have no effect, and names that are not simulated.
     """

@@ -141,7 +141,7 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """Value that was compared with the limit: the flown or planned value, whichever fits the margin.
+        """Value that was compared with the limit: the flown or the planned value, as the margin shows.
 
         Without a limit or a margin, it is the flown value, or else the planned value; None if both are missing.
         """
@@ -161,7 +161,7 @@ class Finding:
 
     @property
     def limit_text(self) -> str:
-        """Text of the values that pass, always with the tolerance; "" without a limit.
+        """Passing values as text, including the tolerance, such as "≤ 12 m"; "" without a limit.
 
         >>> make_finding("stall", Place("flight"), ok=True, reason="", limit=9.5, unit="m/s", at_least=True).limit_text
         '≥ 9.5 m/s'
@@ -189,7 +189,7 @@ class Finding:
 
     @property
     def tolerance_note(self) -> str:
-        """Note on a value beyond its limit that passes, within the tolerance; "" for any other finding.
+        """Note on a value that is beyond its limit but passes within the tolerance; otherwise "".
 
         >>> place = Place("leg", 1)
         >>> make_finding("stall", place, ok=True, reason="", tolerance=0.2, margin=-0.1, unit="m/s").tolerance_note
@@ -200,7 +200,7 @@ class Finding:
 
     @property
     def where(self) -> str:
-        """Text of the place."""
+        """Name of the place, such as "leg 4"."""
         return place_text(self.place)
 
     @property
@@ -233,7 +233,7 @@ class Message:
 
 
 def message(brief: str, explanation: str = "", *, placed: bool = False) -> Message:
-    """Make a message from a brief statement and an explanation.
+    """Make a message from a brief statement, which a headline shows, and an explanation.
 
     explanation: appended as it is, so it begins with its own punctuation or space.
     placed: True if the message begins with the finding's place.
@@ -297,7 +297,7 @@ def make_finding(
     """Make a finding with numbers rounded to 1e-6; non-finite numbers become None.
 
     reason: the whole reason, which begins with the faults.
-    faults: messages on what failed; the first one gives the brief reason, which is `reason` without faults.
+    faults: messages on what failed.  The brief reason comes from the first one; without faults, it is `reason`.
     facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
 
@@ -350,7 +350,7 @@ def worst_first_key(finding: Finding) -> tuple[int, float]:
 
 
 def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Join faults and details into the reason of a finding; without faults, the reason is the details alone.
+    """Join faults and details of a finding into its reason.
 
     facts: texts on measured values, such as "radius 76 m".
 

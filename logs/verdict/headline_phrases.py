@@ -31,12 +31,12 @@ def reason_phrase(noun: str, finding: Finding) -> str:
 
 
 def event_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase for an event that ends the flight: its brief reason, without a place."""
+    """Return a phrase for an event that ends the flight: the finding's brief reason, without its place."""
     return f"{noun} ({shorten_statement(finding.brief)})"
 
 
 def return_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase for a failed return to launch: `reason_phrase`, or only the brief reason at a waypoint."""
+    """Return a phrase for a failed return to launch: `reason_phrase`, but at a waypoint without the place."""
     if finding.place.kind == "waypoint":
         return shorten_statement(finding.brief)
     return reason_phrase(noun, finding)
@@ -108,7 +108,10 @@ def _flown_or_planned(finding: Finding) -> float:
 
 
 def photo_line_phrase(noun: str, finding: Finding) -> str:
-    """Return `shortfall_phrase` for a photo line's usable fraction, or for the overlap that `Finding.check` names."""
+    """Return `shortfall_phrase` for a photo line's usable fraction or a survey's overlap.
+
+    `Finding.check` names the overlap that failed.
+    """
     return shortfall_phrase(finding.check or noun, finding)
 
 

@@ -36,11 +36,11 @@ def judge_flight(
     requirements: RouteRequirements | None = None,
     findings_only: bool = False,
 ) -> Verdict:
-    """Judge a flown track at the level "flown".
+    """Judge a flown track, and return its verdict at the level "flown".
 
     Any track is judged, even a short or damaged one; missing data makes the verdict incomplete.  A track without rows
-    means that the flight never began: then the route is judged instead, at the level "geometric".  An imported flight
-    is judged by `logs.verdict.imported.judge_imported_flight.judge_imported_flight`.
+    means that the flight never began.  The planned path is then judged instead, at the level "geometric".  An
+    imported flight is judged by `logs.verdict.imported.judge_imported_flight.judge_imported_flight`.
 
     end_reason: "completed", or the reason why the flight ended early.
     log_complete: True if the log is not cut off.
@@ -102,10 +102,10 @@ def judge_flight(
 
 
 def with_reference(verdict: Verdict, requirements: RouteRequirements, reference: ReferenceFlights) -> Verdict:
-    """Return a verdict with the results of its reference flights, and with its summary written again.
+    """Add the results of reference flights to a verdict, and rewrite its summary.
 
-    They are the airframe's answer, the suggestions that passed, and, unless the verdict is flyable, the deciding
-    parameter.  A verdict on a flight that never began is returned unchanged.
+    The results are the airframe's answer, the suggestions that passed their trials, and, unless the verdict is
+    flyable, the deciding parameter.  A verdict on a flight that never began is returned unchanged.
     """
     if verdict.level != "flown":
         return verdict
@@ -142,11 +142,12 @@ def _has_failed(findings: Sequence[Finding]) -> bool:
 def _disagreements(
     level: str, level_findings: Sequence[Finding], flight_findings: Sequence[Finding]
 ) -> tuple[Disagreement, ...]:
-    """Return the rules and places that a level and the flight judge differently, in the level's order.
+    """Return the rules and places that another level and the flight judge differently.
 
-    A rule that judges no flight is compared with the rule that `FLOWN_COUNTERPARTS` names for it.
+    They are in the order of `level_findings`.  A rule that judges no flight is compared with its counterpart in
+    `FLOWN_COUNTERPARTS`.
 
-    level: name of the level.
+    level: name of the level, such as "geometric" for the planned path.
     """
     level_outcomes, flight_outcomes = _worst_outcomes(level_findings), _worst_outcomes(flight_findings)
     flown_by_rule = {outcome.rule: outcome for outcome in flight_outcomes.values()}
@@ -163,7 +164,7 @@ def _disagreements(
 
 
 def _worst_outcomes(findings: Sequence[Finding]) -> dict[tuple[object, ...], Finding]:
-    """Return the worst judged finding of each rule at each place, by a key that is the same at all levels.
+    """Return each rule's worst judged finding at each place; the keys are the same at all levels.
 
     The corners of one loiter share a key, because levels may differ in which corner is the worst.  For the same reason
     all front overlaps share a key, and all side overlaps.

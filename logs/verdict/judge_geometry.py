@@ -21,7 +21,7 @@ from world.wording import count_text
 
 
 def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
-    """Judge a route by its geometry and the aircraft's envelope, at the level "geometric".
+    """Judge a planned route by its geometry and the aircraft's envelope: the level "geometric".
 
     requirements: the setup's route requirements if already known.
 
@@ -118,7 +118,7 @@ _EXCEEDED_TEXTS = {
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
-    """Judge a search that found no feasible plan by the margins in the certificate of its best path.
+    """Judge an infeasible plan by the margins in the certificate of the best path that the search found.
 
     The verdict's level is "plan", and the verdict is never complete, because nothing was flown.
 

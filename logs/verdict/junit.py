@@ -115,5 +115,5 @@ def answer_case(reason: str) -> JunitCase:
 
 
 def _without_control_characters(text: str, keep: str = "") -> str:
-    """Replace non-printable characters that are not in `keep` with spaces; XML 1.0 permits few of them."""
+    """Replace non-printable characters, which XML mostly forbids, by spaces, except those in `keep`."""
     return "".join(character if character.isprintable() or character in keep else " " for character in text)

@@ -78,7 +78,7 @@ class Place(DocumentConfig):
 
 
 def numbered_place(place: Place) -> Place:
-    """Return a place with its number in texts as its index, so that all corners of a loiter are one place.
+    """Replace a place's index by the number that texts show, which all corners of a loiter share.
 
     A place without a number is returned unchanged.
 

@@ -80,11 +80,9 @@ def suggest_shift_past_zone(
 ) -> tuple[Suggestion, ...]:
     """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
 
-    finding: the finding on the violated zone.
-
-    The shift is measured on the violating legs: on the planned path if it violates the zone, otherwise on the flown
-    track.  If the flight violates the zone more deeply than the plan, the shift grows by the difference.  The shifted
-    path clears the zone by the navigation error and `SUGGESTION_LENGTH_MARGIN_M`.
+    The shift is measured on the violating legs of the planned path, or of the flown track if the plan does not violate
+    the zone.  If the flight violates the zone more deeply than the plan, the shift grows by the difference.  The
+    shifted path clears the zone by the navigation error and `SUGGESTION_LENGTH_MARGIN_M`.
     """
     zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if zone_index is None or "entry leg" not in facts:
@@ -517,7 +515,7 @@ def home_height_text(setup: FlightSetup) -> str:
 
 
 def lowest_clearance(findings: Sequence[Finding]) -> float:
-    """Return the lowest height above ground that a clearance finding with a margin states, m; NaN without one."""
+    """Return the lowest height above ground in the clearance findings, m; NaN if no finding has a margin."""
     heights = [
         finding.margin + (finding.limit or 0.0)
         for finding in findings
@@ -572,9 +570,9 @@ def _suggest_altitude_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestio
 
 
 def _suggest_lower_altitudes(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest readings that lower the path: a home above the ground set on the ground, too high altitudes as AMSL.
+    """Suggest setting a home above the ground on the ground, and reading too high altitudes as AMSL.
 
-    Return () if neither applies.
+    Both lower the path.  Return () if neither applies.
     """
     home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
     return (*home_on_ground, *_suggest_altitude_frame(setup, Frame.GLOBAL))

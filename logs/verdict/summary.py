@@ -68,7 +68,7 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
 
 
 def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[str] = ()) -> str:
-    """Return the answer of a verdict with its failed, unjudged or narrowly passed findings, in one line.
+    """Return a line with the verdict's answer and its failed, unjudged or narrowly passed findings.
 
     flyable: True if the verdict is flyable.
     setup_notes: notes from the function `setup_notes`.
@@ -128,9 +128,9 @@ def undecided_text(findings: Sequence[Finding]) -> str:
 
 
 def _first_briefs(briefs: Sequence[str], noun: str) -> list[str]:
-    """Return the first `_MAX_NAMED_FINDINGS` texts, and a text with the count of the others.
+    """Keep the first `_MAX_NAMED_FINDINGS` texts, and replace the others by one text with their number.
 
-    noun: noun for what is counted, in the singular.
+    noun: what the texts describe, in the singular, such as "item".
 
     >>> _first_briefs(["a", "b", "c", "d", "e"], "item")
     ['a', 'b', 'c', 'd', '1 more item']
@@ -246,7 +246,7 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _passing_errors(findings: Sequence[Finding], rule: str, fact_name: str) -> list[tuple[float, Place]]:
-    """Return the value and the place of one fact in each finding of a rule that has it and did not fail."""
+    """Collect value and place of a fact from all findings of a rule that did not fail and have the fact."""
     return [
         (fact.value, finding.place)
         for finding in findings
@@ -368,7 +368,7 @@ def summary_lines(
 
 
 def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tuple[str, str]]:
-    """Return each rule with unjudged findings, with a text on their places and the reasons.
+    """Return a pair for each rule with unjudged findings: the rule, and a text on places and reasons.
 
     Findings with the same reason are described together, in the order of the first of each.
     """

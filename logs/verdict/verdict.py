@@ -24,7 +24,7 @@ from logs.verdict.presentation import (
     RuleFindings,
     findings_by_rule,
 )
-from logs.verdict.wording import text_after
+from logs.verdict.wording import strip_prefix
 from world.extras import require_extra
 from world.html_table import html_table
 from world.wording import count_text
@@ -137,7 +137,7 @@ class Verdict:
 
     @property
     def closest(self) -> dict[str, Finding]:
-        """By rule, the failed finding furthest beyond its limit, or the finding closest to its limit.
+        """Failed finding furthest beyond its limit, or else the finding closest to its limit, by rule.
 
         Rules without a finding that failed or was judged by a number are left out.
 
@@ -237,7 +237,7 @@ class Verdict:
     @property
     def reasons(self) -> str:
         """Headline without the title or the answer at its beginning."""
-        return text_after(self.headline, (self.title, self.answer))
+        return strip_prefix(self.headline, (self.title, self.answer))
 
     @property
     def failed_rules(self) -> tuple[RuleFindings, ...]:

@@ -215,7 +215,7 @@ def _other_change_text(change: Change) -> str:
 
 
 def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
-    """Return the magnitudes of wanted and current value, with enough digits to show that they differ.
+    """Return the wanted and the current value as unsigned texts, with enough digits to tell them apart.
 
     digits: minimum number of digits after the decimal point.
 
@@ -234,9 +234,9 @@ def _changed_texts(change: Change, digits: int = 0) -> tuple[str, str]:
 
 
 def _length_text(change: Change) -> str:
-    """Return a leg with its present and its new length, such as "leg 1 from 150 m to 260 m".
+    """Name a leg with its present and its new length, such as "leg 1 from 150 m to 260 m".
 
-    For a vertical leg, the text states this instead of the present length.
+    For a vertical leg, the text is "leg 1 to 260 m (it is vertical)".
     """
     current = change.current or 0.0
     place_name = place_text(change.place)
@@ -459,10 +459,10 @@ def shorten_statement(statement: str) -> str:
     return (" ".join(words).rstrip(",;:") or statement[:cut_length]) + "..."
 
 
-def text_after(text: str, prefixes: Sequence[str]) -> str:
-    """Return a text without the prefix with which it begins, and without the punctuation after the prefix.
+def strip_prefix(text: str, prefixes: Sequence[str]) -> str:
+    """Remove the first matching prefix from a text, and the punctuation after it.
 
-    >>> text_after("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
+    >>> strip_prefix("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
     'slope on leg 1'
     """
     length = next((len(prefix) for prefix in prefixes if text.lower().startswith(prefix.lower())), 0)
@@ -479,7 +479,7 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def energy_left_text(energy: float) -> str:
-    """Return a text on the energy left at the end of a flight, Wh; a negative energy is missing.
+    """Describe the energy left at the end of a flight, Wh, or the missing energy if it is negative.
 
     >>> energy_left_text(11.87), energy_left_text(-3.0)
     ('11.9 Wh left', '3 Wh missing')

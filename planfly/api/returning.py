@@ -13,7 +13,7 @@ from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import INTERRUPTED, Recorder
-from logs.verdict.returns.drawn_returns import drawn_returns
+from logs.verdict.returns.drawn_returns import collect_drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
 from logs.verdict.returns.judge_returns import (
@@ -324,7 +324,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
         if request.folder is None or not result.returns.each:
             return result
         with stage("drawing", "drawing returns"):
-            drawn_returns_data = drawn_returns(world, starts, judged_returns, result.glides)
+            drawn_returns_data = collect_drawn_returns(world, starts, judged_returns, result.glides)
             # Imported here: only pictures need matplotlib.
             from logs.views.figures import draw_pictures, return_views
 

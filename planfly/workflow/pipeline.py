@@ -16,7 +16,7 @@ from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.measures.route_requirements import RouteRequirements, check_energy, route_requirements
 from logs.verdict.places import ReferenceFlights
-from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
+from logs.verdict.returns.drawn_returns import DrawnReturns, collect_drawn_returns, collect_drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
@@ -150,8 +150,8 @@ class ReturnSummary:
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         if not glides:
-            return drawn_returns_without_glides(self.world, self.starts, self.returns)
-        return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
+            return collect_drawn_returns_without_glides(self.world, self.starts, self.returns)
+        return collect_drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

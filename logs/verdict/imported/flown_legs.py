@@ -44,10 +44,12 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs flown in a stretch of the log that follows the mission; return None if there are none.
+    """Find the legs that the aircraft flew in one stretch of the log; return None if there are none.
 
     The first leg starts at the first waypoint that was passed, and the last leg ends at the last one.  If the log
     continues for more than `PARTIAL_LEG_MIN_S` beyond it, the next leg is added as a partly flown leg.
+
+    stretch: part of the log in which the aircraft follows the mission.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -175,7 +177,7 @@ class PlanMismatch:
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Explain why a flight did not follow the setup's mission; return None if it did.
+    """Return the reason why a flight did not follow the setup's mission; None if it did.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch

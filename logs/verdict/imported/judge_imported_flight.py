@@ -116,7 +116,7 @@ def imported_summary_lines(
 
 
 def altitude_source_text(imported_log: ImportedLog) -> str:
-    """Describe the source and the datum of a log's altitudes, and how far other altitudes differ at the start.
+    """Describe source and datum of a log's altitudes, and the log's other altitudes at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights = Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))
@@ -129,7 +129,7 @@ def altitude_source_text(imported_log: ImportedLog) -> str:
 
 
 def row_faults_text(faults: RowFaults, gaps: int) -> str:
-    """List the numbers of a log's gaps and faulty rows, such as duplicates and clock jumps.
+    """State how many gaps a log has, and how many faulty rows of each kind, such as duplicates.
 
     gaps: number of pauses between the rows.
     >>> row_faults_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
@@ -297,7 +297,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         "flown",
         levels=(own_answer,),
         notes=setup.route.notes,
-        leg_ends=_leg_ends(setup, flown_stretches),
+        leg_ends=_leg_end_times(setup, flown_stretches),
         parameters=setup.autopilot.parameters,
         unjudged=unjudged_text,
         imported=True,
@@ -352,7 +352,10 @@ def _judge_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
 
 
 def _mark_unjudged_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
-    """Return the finding, marked as not judged if its rule needs data or an aircraft that the log does not provide."""
+    """Mark a finding as not judged if its rule needs data that the log lacks, or a known aircraft.
+
+    A finding that can be judged is returned unchanged.
+    """
     imported_log = setup.imported_log
     if imported_log is None:
         return finding
@@ -400,8 +403,8 @@ def _merge_precedence(finding: Finding) -> int:
     return {False: 2, True: 1, None: 0}[finding.ok]
 
 
-def _leg_ends(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """Return the end time of each leg of the whole route except the last, s; inf from the first unreached leg on.
+def _leg_end_times(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
+    """Return the end time, s, of each leg of the whole route except the last; inf if it was not reached.
 
     The times never decrease.
     """

@@ -101,7 +101,7 @@ Key = TypeVar("Key")
 
 
 def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -> list[tuple[Key, list[Element]]]:
-    """Group consecutive elements by key, and append to each group the first element of the next group.
+    """Group consecutive elements by key; end each group with the first element of the next group.
 
     >>> group_segments([1, 3, 2, 5], lambda one: one % 2)
     [(1, [1, 3, 2]), (0, [2, 5]), (1, [5])]
@@ -112,7 +112,7 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
     return groups
 
 
-def drawn_returns(
+def collect_drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
     """Collect the data for a drawing of the returns to launch: the worst paths and the lowest safe altitudes.
@@ -124,7 +124,7 @@ def drawn_returns(
     return DrawnReturns(returns, worst_returns(world, starts, returns), min_altitudes, glides)
 
 
-def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
+def collect_drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
     """Collect the data for a quick drawing of the returns to launch: the worst paths only.
 
     Glides and lowest safe altitudes, which take the most time, are left out.
@@ -133,10 +133,10 @@ def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, retur
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Select the returns to draw, at most `MAX_DRAWN_PATHS`, and simulate them again to store their paths.
+    """Select at most `MAX_DRAWN_PATHS` returns to draw, and simulate them again to get their paths.
 
-    These are the worst return of each kind of failure, and then other failures.  If all returns are safe, it is the
-    return with the least clearance.  Return () without returns.
+    The worst return of each kind of failure comes first, and then other failures.  If all returns are safe, only the
+    return with the least clearance is selected.  Return () if `returns` is empty.
     """
     unsafe_ranges = [return_range for return_range in returns.ranges if not return_range.worst.safe]
     worst_range_by_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe_ranges)}
@@ -177,8 +177,8 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
 def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltitudes:
     """Find the lowest altitude from which a return is safe, at up to `_MAX_STARTS` of the starts.
 
-    The search goes up or down from the flight's altitude in steps, and then bisects the last step.  An altitude is NaN
-    if the ground is unknown or none is safe.
+    The search goes up or down from the flight's altitude in steps, and then bisects the last step.  The result
+    is NaN for a start over unknown ground, and if no altitude is safe.
     """
     if not len(starts):
         return MinSafeAltitudes(np.zeros(0), np.zeros(0))

@@ -75,7 +75,7 @@ class GlideFootprint:
     def landings(
         self, east: tuple[float, float] = _WHOLE_RANGE, north: tuple[float, float] = _WHOLE_RANGE
     ) -> tuple[Part, ...]:
-        """Return the outlines of ground on which a landing is possible.
+        """Return the outlines of the areas in which a landing is possible.
 
         east, north: ranges (from, to) of the map, m; by default the whole map.
         """

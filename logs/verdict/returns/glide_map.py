@@ -71,7 +71,7 @@ class GlideMap:
     sphere_tops: Floats
 
     def cell_at(self, east: float, north: float) -> tuple[int, int]:
-        """Return the row and the column of the cell at a position (m); the cell may lie off the map."""
+        """Return the row and column of the cell at a position, m; they may lie outside the map."""
         row = round((north - self.south) / self.cell)
         column = round((east - self.west) / self.cell)
         return row, column
@@ -174,7 +174,8 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
     It is NaN if the square leaves the map.
     values: (n, e).
-    row_weights, column_weights: weights of the square's rows and columns, (s,) with s odd; a cell has their product.
+    row_weights, column_weights: weights of the square's s rows and columns, (s,), s odd.  The weight of a cell in the
+        square is the product of its row's and its column's weight.
     """
     sums = values
     for axis, weights in ((0, row_weights), (1, column_weights)):

@@ -36,7 +36,7 @@ _REACH_TEXTS: dict[Reach, str] = {
 
 
 def reached_text(reach: Reach) -> str:
-    """Describe the kind of the best destination in reach after an engine failure.
+    """Describe which kind of destination is in reach after an engine failure.
 
     >>> reached_text("home")
     'home is in reach'
@@ -45,7 +45,7 @@ def reached_text(reach: Reach) -> str:
 
 
 def glides_headline(glides: Glides) -> str:
-    """Summarize in one line which destinations are in reach after an engine failure, or why this is not judged.
+    """Return a line on the destinations in reach after an engine failure, or on why they are not judged.
 
     >>> glides_headline(Glides((), (), 18.0, not_judged="terrain"))
     'not judged: there is no elevation file'
@@ -87,7 +87,7 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range of engine failures: best destination, altitude to spare, and the autopilot's own RTL."""
+    """Describe a time range of engine failures: best destination, spare altitude and the autopilot's RTL."""
     glide, altitude_left = glide_range.lowest_glide, glides.altitude_left(glide_range.lowest_glide)
     time_text, worst_text = f"{glide_range.first:.0f} s", ""
     if glide_range.count > 1:

@@ -243,7 +243,10 @@ class Returns:
 
     @property
     def safe(self) -> bool:
-        """True if every return is safe and no part is left unjudged; the landing at a return's end is not judged."""
+        """True if there are returns, all are safe, and `unjudged_parts` is empty.
+
+        A landing at the end of a return is not judged.
+        """
         return bool(self.each) and not self.unjudged_parts and all(ret.safe for ret in self.each)
 
     @property
@@ -273,7 +276,7 @@ class Returns:
 
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
-        """Point of no return by energy, for RTLs; returns that do not arrive are skipped."""
+        """Last start from which an RTL leaves the energy reserve; RTLs that do not arrive are skipped."""
         last_time, min_energy_left, skipped_count = math.nan, math.inf, 0
         if not self.each:
             return PointOfNoReturn("not flown")
@@ -410,16 +413,16 @@ class ReturnWorld:
         return () if self.uses_other_autopilot else self.autopilot.returns.causes(self.mission)
 
     @property
-    def ending(self) -> Ending:
-        """Ending of an RTL: a loiter, or a landing sequence that is joined from the loiter or straight."""
+    def rtl_ending(self) -> Ending:
+        """End of an RTL: a loiter, a loiter followed by a landing, or a direct landing."""
         ending_by_join: dict[str, Ending] = {"circle": "on to land", "straight": "straight to land"}
         return ending_by_join.get(self.autopilot.returns.rules.landing_join, "circle") if self.landings else "circle"
 
     @property
-    def endings(self) -> tuple[Ending, ...]:
-        """Endings of the returns from all possible causes, the ending of an RTL first."""
-        has_landing = any(cause.action == "land" for cause in self.causes) and self.ending != "straight to land"
-        return (self.ending, "straight to land") if has_landing else (self.ending,)
+    def return_endings(self) -> tuple[Ending, ...]:
+        """Ways in which returns end: `rtl_ending`, and a direct landing if an event can cause one."""
+        has_landing = any(cause.action == "land" for cause in self.causes) and self.rtl_ending != "straight to land"
+        return (self.rtl_ending, "straight to land") if has_landing else (self.rtl_ending,)
 
     @property
     def is_simulated(self) -> bool:
@@ -439,7 +442,7 @@ class ReturnWorld:
             parts.append("autoland")
         parts += behaviour.unsimulated_part_texts(self.mission)
         begins_with_landing = any(landing.is_landing for landing in self.landings)
-        if begins_with_landing and any(ending != "circle" for ending in self.endings):
+        if begins_with_landing and any(ending != "circle" for ending in self.return_endings):
             parts.append("landing")
         if self.setup.imported_log is None and home_height(self.setup) > HOME_ERROR_M:
             parts.append(
@@ -451,11 +454,11 @@ class ReturnWorld:
         """Return the destination of an RTL.
 
         row: start of the RTL, with the fields `east`, `north` and `up`, m.
-        ending: how the RTL ends; by default as the autopilot's rules demand.
+        ending: how the RTL ends; by default `rtl_ending`.
         """
         rules = self.autopilot.returns.rules
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
-        ending = ending or self.ending
+        ending = ending or self.rtl_ending
         if ending == "straight to land" and (landing := nearest_landing_sequence(position, self.landings)) is not None:
             distance = math.dist(position[:2], landing.position[:2])
             name, reason = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
@@ -464,11 +467,11 @@ class ReturnWorld:
         return self.with_landing(target) if ending == "on to land" else target
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
-        """Return an RTL's target with the landing sequence to which the RTL goes on from its loiter.
+        """Add to an RTL's target the landing sequence that follows the RTL's loiter.
 
-        The target is returned unchanged if the RTL does not go on to a landing.
+        The target is returned unchanged if no landing follows.
         """
-        landing = nearest_landing_sequence(target.position, self.landings) if self.ending == "on to land" else None
+        landing = nearest_landing_sequence(target.position, self.landings) if self.rtl_ending == "on to land" else None
         if landing is None:
             return target
         reasons = [reason for reason in (target.reason, self._choice_reason(landing)) if reason]
@@ -507,7 +510,7 @@ def rtl_autopilot_title(setup: FlightSetup) -> str:
 
 
 def make_return_world(setup: FlightSetup, rtl_autopilot: Autopilot | None = None) -> ReturnWorld:
-    """Collect the data with which returns to launch from a setup's mission are simulated.
+    """Collect the data for simulating returns to launch from a setup's mission.
 
     rtl_autopilot: autopilot whose RTL is simulated; None for the setup's autopilot, or ArduPlane if that has no RTL.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
@@ -539,7 +542,7 @@ def make_return_world(setup: FlightSetup, rtl_autopilot: Autopilot | None = None
 
 
 def engine_out_world(world: ReturnWorld) -> ReturnWorld:
-    """Return the world in which returns to launch without thrust are simulated.
+    """Return the world for simulating returns to launch without thrust.
 
     It is the given world if its autopilot's RTL can be simulated without thrust.  Otherwise ArduPlane's RTL replaces
     it, with ArduPlane's parameters for the aircraft, and the airspeeds of the user's PX4 parameter file.
@@ -575,7 +578,7 @@ def judge_returns(
     max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Simulate and judge the RTL from each start, once for each ending of `ReturnWorld.endings`.
+    """Simulate and judge the RTL from each start, once for each ending in `ReturnWorld.return_endings`.
 
     Returns from low starts that only sink to the ground are left out; `Returns.omitted_count` states their number.
 
@@ -586,9 +589,9 @@ def judge_returns(
     """
     returns: list[SimulatedReturn] = []
     differences: list[float] = []
-    omitted_count, total_count = 0, len(world.endings) * len(starts)
+    omitted_count, total_count = 0, len(world.return_endings) * len(starts)
     start_heights, min_heights = heights_above_ground(world, starts), required_heights(world, starts)
-    for number, ending in enumerate(world.endings):
+    for number, ending in enumerate(world.return_endings):
         advance(number * len(starts), total_count)
         if not world.is_simulated or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
@@ -616,7 +619,7 @@ def judge_returns(
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
         returns += reported_returns
     parameters, trials = world.autopilot.parameters, world.autopilot.returns.trials
-    ending_names = {name for ending in trials.endings for name in ending if world.ending == "straight to land"}
+    ending_names = {name for ending in trials.endings for name in ending if world.rtl_ending == "straight to land"}
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
         each=tuple(returns),
@@ -666,7 +669,7 @@ def flies_landing_approach(targets: Sequence[ReturnTarget]) -> Flags:
 def exclude_approaches(
     world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], results: Records, min_heights: Floats
 ) -> Records:
-    """Return the results of simulated returns, with clearances that exclude the approach to a landing.
+    """Correct the clearances of simulated returns so that they exclude the approach to a landing.
 
     After the first item of a landing sequence, a return flies the mission's approach, which descends to the landing.
     The clearance of a return that becomes too low on the approach is therefore measured only up to the first item.
@@ -926,7 +929,7 @@ def _corrected_return(
 def _with_offsets(
     world: ReturnWorld, ret: SimulatedReturn, result: Record, height_offset: float, distance_offset: float
 ) -> SimulatedReturn:
-    """Return a copy of a return with offsets (m) added to its clearance and sphere distance, classified again."""
+    """Add offsets (m) to a return's clearance and sphere distance, and classify its outcome again."""
     corrected_result = result.copy()
     corrected_result["clearance"] += height_offset
     corrected_result["sphere_distance"] += distance_offset
@@ -958,7 +961,7 @@ def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
 
 
 def limit_ratio(ret: SimulatedReturn) -> float:
-    """Return a return's distance from its nearest limit, divided by the error of the point mass.
+    """Return a return's smallest distance from a limit, divided by the error of the point mass.
 
     The limits are the ground, the required height and the kill spheres.  Below 1, the error of the point mass may
     change the outcome.  Return inf for a violated zone or unknown ground, and if all distances are unknown.

@@ -255,7 +255,10 @@ def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floa
 
 
 def _moves_before_return(setup: FlightSetup) -> Records:
-    """Return the moves of the planned path up to the mission's RTL, of dtype `MOVE`; empty if it begins with an RTL."""
+    """Return the moves of the planned path up to the mission's RTL, of dtype `MOVE`.
+
+    The result is empty if the mission begins with an RTL.
+    """
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
@@ -334,7 +337,7 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
 
 
 def _start_records(time: Floats, position: Floats, velocity: Floats, roll: Floats) -> Records:
-    """Return n starts of returns to launch as records of dtype `RETURN_START`.
+    """Combine the states of n starts into records of dtype `RETURN_START`.
 
     time: s after take-off, (n,).
     position: m, (n, 3).

@@ -95,7 +95,7 @@ UNJUDGED_PART_TEXTS = {
 
 
 def unjudged_parts_text(parts: Sequence[str]) -> str:
-    """Describe the parts of returns that are not judged; "" if all are.
+    """Describe the parts of returns that are not judged; return "" if all are judged.
 
     >>> unjudged_parts_text(("autoland", "RTL_LAND_DELAY 0 lands after the return, which is not simulated"))
     'mode AUTOLAND lands by a pattern of its own; RTL_LAND_DELAY 0 lands after the return, which is not simulated'
@@ -161,14 +161,17 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
 
 
 def failure_counts_text(returns: Returns) -> str:
-    """State how many returns are not safe, by outcome, the worst first, as "3 hit the ground"; "" if all are safe."""
+    """Count the unsafe returns by outcome, worst first, such as "3 hit the ground"; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {kind: _kind_text(returns, kind, is_plural=count != 1) for kind, count in counts.items()}
     return ", ".join(f"{count} {texts[kind]}" for kind, count in counts.items() if count)
 
 
 def _kind_text(returns: Returns, kind: Kind, *, is_plural: bool) -> str:
-    """Return the verb phrase for the returns with an outcome, with the names of the violated zones."""
+    """Return the verb phrase for an outcome, such as "hit the ground", with the names of violated zones.
+
+    is_plural: True for a verb in the plural.
+    """
     text = (_PLURAL_TEXTS if is_plural else _SINGULAR_TEXTS)[kind].format(limit=returns.limit)
     names = list(
         dict.fromkeys(ret.violation.name for ret in returns.each if ret.kind == "zone" and ret.violation is not None)
@@ -288,7 +291,9 @@ def describe_return_causes(causes: tuple[Cause, ...]) -> list[str]:
 
 
 def describe_rtl_ending(returns: Returns) -> list[str]:
-    """Describe in one or two lines how ArduPlane's RTL ends, by RTL_AUTOLAND and the mission's landing sequences.
+    """Describe in one or two lines how ArduPlane's RTL ends.
+
+    This depends on RTL_AUTOLAND and the mission's landing sequences.
 
     For any other autopilot, return its line on the path of an RTL, or [] if it has none.
 

@@ -90,7 +90,7 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = RETURN_LIMIT_MARGIN_M) -> _ReturnLimits:
-    """Return the height above ground and the distance from kill spheres that the return from each start has to keep.
+    """Return the height above ground and the sphere distance that the return from each start must keep.
 
     If the start itself is lower or closer to a sphere, only its own value minus the height lost in the turn is
     required.
@@ -141,7 +141,9 @@ Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 def _rtls_meet_criterion(
     world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, criterion: Criterion
 ) -> Flags:
-    """Return a mask (n,): True for each start whose RTL, to the destination that the autopilot chooses, is good enough.
+    """Return a mask (n,): True for each start whose RTL meets a criterion.
+
+    The RTL goes to the destination that the autopilot chooses.
 
     criterion: see `_meets_criterion`.
     """
@@ -182,7 +184,10 @@ def _meets_criterion(
 
 
 class _ReturnTrial:
-    """Test of the returns from all starts in a changed world, which begins with the starts that failed last."""
+    """Test whether the returns from all starts meet a criterion in a changed world.
+
+    The starts that failed last are tested first.
+    """
 
     def __init__(self, starts: ReturnStarts, limits: _ReturnLimits) -> None:
         self._starts, self._limits = starts, limits
@@ -216,7 +221,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     if trial.passes(world, _meets_all_limits):
         return []
     endings = world.autopilot.returns.trials.endings
-    if world.ending == "straight to land" and endings:
+    if world.rtl_ending == "straight to land" and endings:
         passing_ending = first_that_passes(
             endings, lambda ending: trial.passes(world.with_parameters(**ending), _meets_all_limits)
         )
@@ -279,11 +284,11 @@ class _AltitudeSearch:
         self._candidates = [float(altitude) for altitude in altitude_grid]
 
     def values(self, altitude: float) -> dict[str, float]:
-        """Return the parameters to change for a height (m), by name; parameters that are not lower keep their value."""
+        """Return the new values, by name, of the parameters that are now below an altitude, m."""
         return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest height from `min_altitude` on with which all returns pass, m, or None if there is none."""
+        """Return the lowest altitude from `min_altitude` on at which all returns pass, m, or None."""
         return first_that_passes(
             (altitude for altitude in self._candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
@@ -326,7 +331,7 @@ def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | N
     limits, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
     is_good_from_home = _rtls_meet_criterion(world.with_rally(()), starts, limits, _meets_all_limits)
-    if is_good_from_home.all() or not start_count or world.ending == "straight to land":
+    if is_good_from_home.all() or not start_count or world.rtl_ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
     best_set: tuple[int, tuple[ReturnPoint, ...]] = (int(is_good_from_home.sum()), ())
@@ -362,7 +367,7 @@ def _search_in_rounds(
     """Search for rally points, simulate all returns, and search again with the starts that remain unsafe.
 
     searched_starts: indices of the starts of the first search.
-    initial_count: number of candidates, from the first one, that form the initial set.
+    initial_count: the first `initial_count` candidates are the initial set.
 
     Return for the best round the number of returns that keep all limits, the points, and the starts that remain unsafe.
     """

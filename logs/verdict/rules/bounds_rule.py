@@ -21,6 +21,8 @@ def bounds_findings(
     """Judge with one finding the minimum distance inside the area's edges, floor and ceiling.
 
     The finding is not judged for a mission without a scenario, which has no area.
+
+    geometric: True to judge the planned path only.
     """
     scenario = requirements.setup.scenario
     if scenario.external:

@@ -50,6 +50,8 @@ def clearance_findings(
 
     Without terrain data, a single unjudged finding stands for all legs.  A further, undecided finding reports a
     doubtful altitude of home.
+
+    geometric: True to judge the planned path only.
     """
     terrain = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
@@ -224,12 +226,12 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
 def _fields_by_leg(
     requirements: RouteRequirements, landing: _Landing | None
 ) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return, by leg, the positions near which the leg may be lower: home, the landing point or both.
+    """Return by leg the positions near which it may be lower than required: home, landing point or both.
 
-    A position is (east, north), m; other legs have no entry.  The legs of a flown or logged take-off have the position
-    of home.  The final approach has the landing point.  So have earlier legs of the landing, from the last waypoint
-    that keeps the full required height.  A landing begins at DO_LAND_START, or without this item one leg before the
-    final approach.
+    A position is (east, north), m; legs without such a position have no entry.  The legs of a flown or logged take-off
+    have the position of home.  The final approach has the landing point.  So have earlier legs of the landing, from the
+    last waypoint that keeps the full required height.  A landing begins at DO_LAND_START, or without this item one leg
+    before the final approach.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     procedures = setup.ground_phases if ground is None else ground.procedures
@@ -271,9 +273,11 @@ def _limit_source(requirements: RouteRequirements, limit: float) -> str:
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe the clearance less the terrain's stated error; return "" if no error is stated.
+    """Describe the clearance minus the terrain's stated error; return "" if no error is stated.
 
-    clearance, limit, error: minimum height above ground, required height and vertical error of the terrain data, m.
+    clearance: minimum height above ground, m.
+    limit: required height above ground, m.
+    error: vertical error of the terrain data, m; None if it is not stated.
     """
     if error is None or math.isnan(clearance):
         return ""
@@ -403,7 +407,7 @@ def _height_text(clearance: float) -> str:
 
 
 def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Message:
-    """Return a message that begins with the name of a leg."""
+    """Make a message that begins with the name of a leg."""
     return message(f"{place_text(requirements.leg_place(leg))} {text}", placed=True)
 
 

@@ -254,7 +254,7 @@ def _take_off_climb(
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
     """Find the obstacles on a path from home.
 
-    The height above ground is not checked on the first `LAUNCH_RUN_M`; it is inf on a path that is no longer.
+    The height above ground is not checked on the first `LAUNCH_RUN_M`.  If the whole path is shorter, it is inf.
     """
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = hazard_on_path(requirements, path)

@@ -208,7 +208,7 @@ def _gap_notes(flown_stretches: Sequence[FlownLegs]) -> list[str]:
 
 
 def _leg_numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
-    """Return the sorted numbers by which messages name legs; all legs of a loiter share one number.
+    """Return the leg numbers that messages show, sorted; all legs of a loiter share one number.
 
     legs: indices in the route.
     """

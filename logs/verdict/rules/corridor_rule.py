@@ -16,10 +16,12 @@ from logs.verdict.wording import compared_texts
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the cross-track distance of each flown leg; if ``geometric``, of each leg's planned turns.
+    """Judge the cross-track distance on each leg.
 
     The legs of a survey are judged only if the scenario states a corridor.  The survey rule judges its photo lines, and
     the autopilot chooses the turns onto the first line and off the last line.
+
+    geometric: True to judge the planned turns only, False to judge the flown track.
     """
     has_stated_corridor = requirements.setup.scenario.limits.corridor_m is not None
     return [
@@ -30,7 +32,10 @@ def corridor_findings(
 
 
 def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    """Judge the largest distance of one leg's flown track, or of its planned turns if ``geometric``, from the legs."""
+    """Judge the largest cross-track distance on one leg.
+
+    geometric: True to judge the planned turns only, False to judge the flown track.
+    """
     limit, source = corridor_limit(requirements, leg)
     planned_distance, flown_distance, ok = float(turn_deviations(requirements, leg).max()), math.nan, None
     faults, facts = [], []

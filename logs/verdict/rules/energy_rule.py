@@ -51,10 +51,12 @@ GUESSED_BATTERY_TEXT = (
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Compare the energy used with the energy in battery or tank less the reserve.
+    """Judge with one finding whether battery or tank contains the energy used and the reserve.
 
     If a battery failsafe acts earlier, it sets the limit.  A mission with an endless jump fails.  The finding is not
     judged if the capacity is a guess, if the power is unknown or too uncertain, or if a failsafe may act.
+
+    geometric: True to judge the energy predicted for the planned path, False to judge the flight.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)

@@ -101,7 +101,7 @@ def fence_findings(
 def _compliance_finding(
     requirements: RouteRequirements, planned_visits: Records, flown_visits: Records | None, moves: Records
 ) -> Finding:
-    """Make the finding that no judged zone is violated, with the distance to the nearest zone.
+    """Make the finding for a path that violates no zone, with the distance to the nearest zone.
 
     It names all zones that the judged path passes within the navigation error.
 

@@ -27,6 +27,8 @@ def height_findings(
     """Judge the maximum height above ground on each leg; return [] if the scenario has no limit.
 
     Without terrain data, a single unjudged finding stands for all legs.
+
+    geometric: True to judge the planned path only.
     """
     scenario = requirements.setup.scenario
     limit, terrain = scenario.limits.max_height_m, scenario.terrain

@@ -58,7 +58,10 @@ class JudgedLink:
 def link_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the scenario's radio link with one finding; [] for a scenario without a link."""
+    """Judge the scenario's radio link with one finding; return [] for a scenario without a link.
+
+    geometric: True to judge the planned path only.
+    """
     link = requirements.setup.scenario.link
     return [] if link is None else [judge_link(requirements, aligned, link, geometric=geometric).finding]
 

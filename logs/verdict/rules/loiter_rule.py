@@ -91,7 +91,7 @@ def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
 def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Replace the findings on each loiter's corners by one, and keep each rule's worst finding on the loiter's legs."""
+    """Merge the findings on each loiter: one for all corners, and each rule's worst on the loiter's legs."""
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -378,7 +378,7 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possib
 
 
 def _stated_loiter(requirements: RouteRequirements, circle: LoiterCircle) -> Loiter | None:
-    """Return the loiter that the mission item of a circle states; None without such an item."""
+    """Return the loiter stated by a circle's mission item; None without such an item."""
     seq = int(requirements.setup.route.items[circle.first])
     return next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
 

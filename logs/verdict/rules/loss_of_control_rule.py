@@ -24,7 +24,9 @@ from world.wording import count_text
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge with one finding if control was lost: unusable rows, extreme bank, low airspeed or ground contact.
+    """Judge with one finding whether control was lost in the flight.
+
+    Signs of a loss are unusable rows, extreme bank, low airspeed and ground contact.
 
     Return [] if ``geometric``, because nothing was flown.  Without usable rows, the finding is not judged.
     """

@@ -60,7 +60,7 @@ C = Command
 def mission_findings(setup: FlightSetup) -> list[Finding]:
     """Judge a mission's items by PX4's checks and planfly's own checks.
 
-    Each check has one finding, on the gravest of its remarks.  For ArduPlane, only failures of PX4's checks that hold
+    Each check has one finding, on its most serious remark.  For ArduPlane, only failures of PX4's checks that hold
     for every autopilot are reported.
     """
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.checks.feasibility
@@ -362,8 +362,8 @@ _PX4_LOCATED_COMMANDS = frozenset(
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
     """Yield a remark on each item that PX4 refuses at upload.
 
-    refuses: True if PX4 is to fly.  Only then are commands without coordinates reported that are in a frame with
-        coordinates, because every file of Mission Planner contains such commands.
+    refuses: True if PX4 is to fly.  If False, a command without coordinates may have a frame with coordinates, because
+        every file of Mission Planner contains such commands.
     """
     for item in mission.items:
         name, support = command_name(item.command), command_support(item.command)
@@ -547,8 +547,8 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
     """Yield a remark on each route point that violates the mission's own fence by PX4's test.
 
-    Without a fence, the only remark states this.  There is none if any of several inclusion zones suffices: the fence
-    rule then judges the flight against their union.
+    Without a fence, the only remark states this.  There are no remarks if the autopilot requires only that the aircraft
+    is inside any one of several inclusion zones.  The fence rule then judges the flight by the union of these zones.
     """
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"

@@ -106,8 +106,8 @@ def run_rules(
         each stop; False for only the findings on legs, corners, threats and zones.
     flight_findings: findings on a flight of a route that is judged by its geometry.  Findings of rules with
         `Rule.is_same_for_plan` are copied from them; None to run these rules, too.
-    suggests: True to add ``suggestions`` to the failed or undecided findings that a change could fix.  If they are more
-        than `MAX_SUGGESTED_FINDINGS`, no finding gets any.
+    suggests: True to add ``suggestions`` to the failed or undecided findings that a change could fix.  If there are
+        more than `MAX_SUGGESTED_FINDINGS` such findings, none of them gets suggestions.
     """
     findings: list[Finding] = []
     for rule in RULES.values():
@@ -145,7 +145,7 @@ _POSITION_RULES = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return an undecided finding for each place that fails if the aircraft reverses to one side, but not to the other.
+    """Return an undecided finding for each place that fails only if the aircraft reverses to one side.
 
     At a corner of 180 degrees the autopilot may turn left or right, so the route is judged for both directions.
     A flight shows only one direction, which depends on its navigation error: of 12 ArduPlane flights through a turn of
@@ -226,7 +226,7 @@ def _needs_suggestions(finding: Finding, return_legs: set[Place]) -> bool:
 def with_passing_suggestions(
     findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Replace the suggestions of each failed finding by its suggestions that passed their trials.
+    """Keep only those suggestions of failed findings that passed their trials.
 
     trials: suggestions that passed their trials, by rule and place; None to keep all suggestions.
 

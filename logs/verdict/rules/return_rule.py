@@ -58,9 +58,11 @@ def return_findings(
 ) -> list[Finding]:
     """Judge the planned returns to launch, and whether an imported flight completed its RTL.
 
-    Planned are the mission's RTL, the RTL after its last item, and the returns that the scenario requires.  Flights
-    simulated by planfly have no findings here: `flown_return_findings` judges them, because their track does not show
-    how they ended.
+    The planned returns are the mission's RTL, the RTL after its last item, and the returns that the scenario requires.
+    Return [] for a flight simulated by planfly, which `flown_return_findings` judges because the track does not show
+    how the flight ended.
+
+    geometric: True to judge the planned path only.
     """
     if geometric:
         required_findings = _requirement_findings(

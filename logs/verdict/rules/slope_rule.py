@@ -50,9 +50,9 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of each leg of the route and of the flight, except in the turnarounds of surveys.
+    """Judge the planned and the flown slope of each leg, except in the turnarounds of surveys.
 
-    If ``geometric``, judge only the route.
+    geometric: True to judge the planned route only.
     """
     findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
@@ -73,7 +73,7 @@ def slope_findings(
 def _vertical_leg_finding(requirements: RouteRequirements, leg: int, slope: float, *, is_flown: bool) -> Finding:
     """Judge a vertical leg that the autopilot flies together with the next leg.
 
-    A climb is undecided without a flight, because the aircraft flies below the next leg as drawn.
+    A climb is undecided without a flight, because the aircraft flies below the line of the next leg.
 
     slope: slope of the vertical leg and the next leg flown as one, rad, positive for a climb.
     """
@@ -283,7 +283,7 @@ class _SteepGround(NamedTuple):
 
 
 def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
-    """Return the part of the ground that rises too steeply for the aircraft to follow it on a leg, or None.
+    """Return the ground on a leg that rises too steeply for the aircraft to follow it, or None.
 
     Return None also for a leg that does not follow the ground, and if the aircraft gets at most `NEGLIGIBLE_STEP_M` too
     low.  After a flight, the measured height error decides, and the autopilot's climb rate limits the slope, too.
@@ -337,10 +337,10 @@ def _uncertainty_text(
     *,
     has_failed: bool,
 ) -> str:
-    """Explain how the uncertainty of the aircraft's model affects a leg: it leaves the slope undecided.
+    """Explain that the uncertainty of the aircraft's model leaves a leg's slope undecided.
 
-    For a leg that has failed, the text states the slope that is certainly possible, for suggestions.  Return "" if the
-    uncertainty does not matter, and for a planned slope above the limit, whose own message states the limit.
+    For a leg that has failed, the text instead states the slope that is certainly possible, for suggestions.  Return ""
+    if the uncertainty does not matter, and for a planned slope above the limit, whose own message states the limit.
 
     limit, source: limit of the slope, rad, and its source.
     has_failed: True if the leg fails.
@@ -364,7 +364,7 @@ def _uncertainty_text(
             " certain"
         )
     # The leg is undecided, too, if the model misses the climb that was stated for the aircraft.
-    if measure is not None and measure.ability is not None and _missing_ability(requirements, leg, measure):
+    if measure is not None and measure.ability is not None and _slope_shortfall(requirements, leg, measure):
         shown = measure.ability.slope
         stated = _climb_shortfall(requirements, leg) + shown
         return (
@@ -419,9 +419,10 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
 
 
 def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
-    """Return True if a leg was flown to its end and its end's arc misses at most `HEIGHT_ERROR_LIMIT_M` of height.
+    """Return True if a leg was flown to its end, with a small height error on the steep arc there.
 
-    Other rules judge the airspeed and the height above ground on the arc.
+    The limit of this error is `HEIGHT_ERROR_LIMIT_M`.  Other rules judge the airspeed and the height above ground on
+    the arc.
     """
     return measure.is_finished and arc.missing_height <= HEIGHT_ERROR_LIMIT_M
 
@@ -467,7 +468,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:
-    """Describe the wind components (m/s) that are not calm, such as "4.5 m/s tailwind and 5.3 m/s crosswind"."""
+    """Describe the notable wind components (m/s), such as "4.5 m/s tailwind and 5.3 m/s crosswind"."""
     along_name = "tailwind" if tailwind > 0.0 else "headwind"
     if min(abs(tailwind), abs(crosswind)) >= CALM_WIND_MPS:
         return f"{abs(tailwind):.1f} m/s {along_name} and {abs(crosswind):.1f} m/s crosswind"
@@ -491,10 +492,10 @@ def _throttle_text(requirements: RouteRequirements, name: str) -> str:
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Return a tuple each for full and idle throttle.
+    """Return one tuple for the time at full throttle, and one for the time at idle throttle.
 
-    It contains the name ("full" or "idle"), the duration, s, the airspeed error, m/s, and its direction ("slow" or
-    "fast").
+    A tuple contains the name ("full" or "idle"), the duration, s, the airspeed error, m/s, and the direction of this
+    error ("slow" or "fast").
     """
     return (
         ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
@@ -505,7 +506,7 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> dict[str, Message]:
-    """Return the faults of a flown leg by what is wrong: "slope", "height", or speed at "full" or "idle" throttle.
+    """Return the faults of a flown leg by kind: "slope", "height", or speed at "full" or "idle" throttle.
 
     limit: limit of the slope, rad.
     performance_faults: faults that show a lack of performance; an airspeed error is then always a fault.
@@ -549,10 +550,11 @@ def _throttle_limit(planned_slope: float) -> str:
     return "full" if planned_slope >= 0.0 else "idle"
 
 
-def _missing_ability(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> float:
-    """Return by how much the slope shown at the throttle limit falls short of the leg's slope, rad; 0 if it does not.
+def _slope_shortfall(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> float:
+    """Return by how much the slope flown at the throttle limit falls short of the planned slope, rad.
 
-    The tolerance and the error of the measured ability are subtracted.  A nearly level leg has no shortfall.
+    The tolerance and the error of the flown slope are subtracted.  Return 0 if nothing is missing, for a nearly level
+    leg, and if no slope at the throttle limit was measured.
     """
     ability, planned_slope = measure.ability, abs(float(requirements.slopes[leg]))
     if ability is None or planned_slope <= LEVEL_SLOPE_RAD:
@@ -561,7 +563,7 @@ def _missing_ability(requirements: RouteRequirements, leg: int, measure: SlopeMe
 
 
 def _climb_shortfall(requirements: RouteRequirements, leg: int) -> float:
-    """Return by how much the model's climb slope at a limited throttle falls short of the stated one, rad.
+    """Return by how much the model's climb slope at a limited throttle is below the stated slope, rad.
 
     Return 0 for a descent, and for an autopilot that does not limit the throttle.
     """
@@ -598,7 +600,7 @@ def _performance_faults(
         if math.hypot(tailwind, crosswind) >= CALM_WIND_MPS:
             text += f", with {_wind_text(tailwind, crosswind)}"
         texts.append(text)
-    if ability is not None and _missing_ability(requirements, leg, measure) > _climb_shortfall(requirements, leg):
+    if ability is not None and _slope_shortfall(requirements, leg, measure) > _climb_shortfall(requirements, leg):
         limit_name = requirements.setup.autopilot.speeds.max_throttle_name if is_climb else ""
         throttle_text = limit_name or f"{_throttle_limit(planned_slope)} throttle"
         texts.append(

@@ -47,7 +47,7 @@ def speed_findings(
 ) -> list[Finding]:
     """Compare each leg's commanded airspeed with the envelope, and the flown airspeed with the command.
 
-    If ``geometric``, findings on the autopilot's parameters come first.
+    geometric: True to judge the planned path only; findings on the autopilot's parameters then come first.
     """
     # The property `demanded_route` computes the route at each access: read it once, not for each leg.
     demanded_speeds = requirements.setup.demanded_route.leg_airspeeds
@@ -159,9 +159,11 @@ def _find_held_speed(
     """Return the airspeed held on a leg if it differs too much from the command, otherwise None.
 
     The airspeed is the mean over the second half of the leg's steady rows, because the aircraft may still change its
-    speed in the first half.  Return None also for a leg that was flown steadily for too short a time, for a leg that is
-    too steep, because the slope rule reports it, for an imported flight, whose airspeed sensor may be wrong, and for an
-    airspeed that was raised to keep a minimum ground speed or that vertical wind caused.
+    speed in the first half.  Return None also in these cases:
+    - The leg was flown steadily for too short a time.
+    - The leg is too steep, which the slope rule reports.
+    - The flight was imported, so that its airspeed sensor may be wrong.
+    - The airspeed was raised to keep a minimum ground speed, or vertical wind caused the difference.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None

@@ -56,6 +56,8 @@ def stall_findings(
     A route whose airspeed is below the stall speed in a planned turn also fails after a flight: an autopilot that flew
     faster or banked less does not make the route flyable.  Return [] for a plan without a turn, and for a flight that
     cannot be compared.
+
+    geometric: True to judge the planned turns only.
     """
     # The planned turn with the smallest margin above the stall.
     worst_margin: tuple[float, int, _Margin] | None = None

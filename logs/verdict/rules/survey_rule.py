@@ -60,8 +60,8 @@ def survey_findings(
 ) -> list[Finding]:
     """Judge each photo line, and the overlap of each survey's photos.
 
-    If ``geometric``, the usable part of a line is the part that its turns and the climb or descent before it leave
-    straight and at its altitude.  Turnarounds near hazards that cannot be flown as drawn are then reported, too.
+    geometric: True to judge the planned lines only.  The usable part of a line then excludes its turns,
+        and a climb or descent before it.  Turnarounds near hazards that cannot be flown as drawn are reported, too.
     """
     findings = []
     for survey in requirements.surveys:

@@ -105,7 +105,7 @@ def _sphere_visit(visits: SphereVisits | None, threat: int) -> _Visit:
 def _no_entry_finding(
     threat_count: int, nearest_distance: float, nearest_name: str, navigation_error: float, is_judged: bool
 ) -> Finding:
-    """Make the finding that no missile sphere is entered.
+    """Make the finding for a path that enters no missile sphere.
 
     threat_count: number of missiles and radars.
     nearest_distance: minimum distance of the path from the nearest sphere's surface, m; inf without a sphere.

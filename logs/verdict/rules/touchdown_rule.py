@@ -66,9 +66,9 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing with one finding; before a flight, only report a strip that is too short to be judged.
+    """Judge a flown landing with one finding; return [] without a flown landing.
 
-    Return [] without a flown landing, unless ``geometric`` and the planned strip is too short.
+    geometric: True before a flight: the only finding is then on a strip that is too short to be judged.
     """
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:

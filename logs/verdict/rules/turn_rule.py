@@ -37,7 +37,7 @@ def turn_findings(
 ) -> list[Finding]:
     """Judge the turn at each inner waypoint, except at the waypoints of turnarounds.
 
-    If ``geometric``, judge only the planned turns.
+    geometric: True to judge the planned turns only.
     """
     measures: list[dict[str, float] | None] = [None if geometric else {}] * (requirements.legs - 1)
     if aligned is not None:
@@ -204,7 +204,7 @@ def _unflown_turn_text(
 
 
 def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Describe a flown turn: pairs of the name of a measured quantity and a text on it."""
+    """Return the measured quantities of a flown turn, as pairs of name and text."""
     facts = []
     if "course change" in measure:
         facts.append(("course change", f"flown course change {math.degrees(measure['course change']):.2f}°"))

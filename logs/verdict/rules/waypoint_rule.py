@@ -26,9 +26,9 @@ from world.arrays import Floats
 def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the distance of the track, or of the planned path if ``geometric``, from each waypoint.
+    """Judge the distance from each waypoint, except the waypoints of turnarounds.
 
-    The waypoints of turnarounds are left out.
+    geometric: True to judge the planned path, False to judge the flown track.
     """
     turnaround_waypoints = requirements.turnaround_waypoints()
     judged_waypoints = [
@@ -191,7 +191,10 @@ def _closest_approach(
 def with_circles_in_reasons(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Return the findings, and add to each failure's reason the circles that the autopilot flew at its waypoints."""
+    """Add the circles that the autopilot flew at a failed place to the reason of its finding.
+
+    Return all findings.
+    """
     if aligned is None or not (circles := waypoint_circles(requirements, aligned)):
         return tuple(findings)
     legs_of_lines = {

@@ -38,9 +38,12 @@ RETURN = {"return_to_east_north_amsl_radius_slope_base_m": [0.0] * 5}
 
 
 def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
-    same(MissionTable.model_validate(through_json(MissionTable.from_dataclass(SETUP.mission))).mission(), SETUP.mission)
-    same(RouteTable.model_validate(ROUTE).route("x"), SETUP.route)
-    same(EnvelopeTable.model_validate(ENVELOPE).envelope("x"), SETUP.envelope)
+    same(
+        MissionTable.model_validate(through_json(MissionTable.from_dataclass(SETUP.mission))).to_mission(),
+        SETUP.mission,
+    )
+    same(RouteTable.model_validate(ROUTE).to_route("x"), SETUP.route)
+    same(EnvelopeTable.model_validate(ENVELOPE).to_envelope("x"), SETUP.envelope)
 
 
 def test_what_is_kept_of_surveys_comes_back() -> None:
@@ -61,7 +64,7 @@ def test_what_is_kept_of_surveys_comes_back() -> None:
         "stated_photo_m": 24.0,
         "height_m": 120.0,
     }
-    same(MissionTable.model_validate(table).mission(), with_surveys)
+    same(MissionTable.model_validate(table).to_mission(), with_surveys)
     # A log of before there were any, and of a mission without a survey, says nothing of them.
     assert "survey_plans" not in json.loads(pack_setup(SETUP)["setup.json"])["mission"]
     packed = pack_setup(replace(SETUP, mission=with_surveys))
@@ -72,15 +75,15 @@ def test_an_unknown_height_is_null() -> None:
     assert (ROUTE["takeoff_ground_m"], ROUTE["landing_ground_m"]) == (None, None)
     known = replace(SETUP.route, takeoff_ground=12.5)
     assert through_json(RouteTable.from_dataclass(known))["takeoff_ground_m"] == 12.5
-    same(RouteTable.from_dataclass(known).route("x"), known)
+    same(RouteTable.from_dataclass(known).to_route("x"), known)
 
 
 def test_a_waypoint_or_item_that_is_none_is_minus_one() -> None:
     assert [ROUTE[key] for key in ("return_from_waypoint", "straight_to_waypoint", "endless_jump")] == [-1] * 3
-    made = RouteTable.model_validate(ROUTE).route("x")
+    made = RouteTable.model_validate(ROUTE).to_route("x")
     assert (made.rtl_start, made.direct_landing_start, made.endless_jump) == (None, None, None)
     with pytest.raises(LogError, match=r"^x: route\.straight_to_waypoint: 4: expected a waypoint, or -1"):
-        RouteTable.model_validate(ROUTE | {"straight_to_waypoint": 4}).route("x")
+        RouteTable.model_validate(ROUTE | {"straight_to_waypoint": 4}).to_route("x")
 
 
 def test_a_return_comes_back_with_its_circle() -> None:
@@ -89,13 +92,13 @@ def test_a_return_comes_back_with_its_circle() -> None:
     table = through_json(RouteTable.from_dataclass(back))
     assert table["return_from_waypoint"] == 2
     assert table["return_to_east_north_amsl_radius_slope_base_m"] == [1.5, -2.0, 435.1, -80.0, 335.0]
-    made = RouteTable.model_validate(table).route("x")
+    made = RouteTable.model_validate(table).to_route("x")
     same(made, back)
     assert made.rtl_loiter is not None
     assert made.rtl_loiter.radius == -80.0
     # A log of before there were returns says nothing of them.
     old = {key: value for key, value in ROUTE.items() if not key.startswith("return")}
-    assert RouteTable.model_validate(old).route("x").rtl_start is None
+    assert RouteTable.model_validate(old).to_route("x").rtl_start is None
 
 
 def test_numbers_stand_under_the_unit_that_they_have() -> None:
@@ -124,7 +127,7 @@ def test_numbers_stand_under_the_unit_that_they_have() -> None:
 )
 def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(LogError, match=f"^x: {message}"):
-        RouteTable.model_validate(ROUTE | change).route("x")
+        RouteTable.model_validate(ROUTE | change).to_route("x")
 
 
 @pytest.mark.parametrize(
@@ -139,7 +142,7 @@ def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], mess
 )
 def test_an_envelope_whose_tables_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(LogError, match=f"^x: {message}"):
-        EnvelopeTable.model_validate(ENVELOPE | change).envelope("x")
+        EnvelopeTable.model_validate(ENVELOPE | change).to_envelope("x")
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from pathlib import Path
 from flight.mission.items import Mission
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup
-from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
+from logs.verdict.returns.drawn_returns import DrawnReturns, collect_drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
@@ -75,4 +75,4 @@ def hill_setup(folder: Path, more: str = "", mission: str = "", rally: tuple[obj
 def hill_drawn(setup: FlightSetup, every: float = 10.0) -> DrawnReturns:
     """What is drawn of the returns and glides from its planned path."""
     world, starts = make_return_world(setup), planned_starts(setup, every)
-    return drawn_returns(world, starts, judge_returns(world, starts, every), judge_glides(world, starts))
+    return collect_drawn_returns(world, starts, judge_returns(world, starts, every), judge_glides(world, starts))

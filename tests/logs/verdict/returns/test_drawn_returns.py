@@ -9,7 +9,7 @@ import pytest
 
 from logs.verdict.returns.drawn_returns import (
     DrawnReturns,
-    drawn_returns_without_glides,
+    collect_drawn_returns_without_glides,
     group_segments,
     min_safe_altitudes,
 )
@@ -44,7 +44,7 @@ def test_where_all_are_safe_the_lowest_is_drawn(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     world, starts = make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
     returns = judge_returns(world, starts, 20.0)
-    (only,) = drawn_returns_without_glides(world, starts, returns).worst
+    (only,) = collect_drawn_returns_without_glides(world, starts, returns).worst
     assert only.simulated.safe
     assert only.simulated.clearance == min(one.clearance for one in returns.each)
 

@@ -364,7 +364,7 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
     setup = setup_by_law(mission(wp(0, -3000, 300), *lines))
     verdict = judge_geometry(setup)
     found = [(item.place.item, item.reason, item.ok) for item in verdict.findings if item.check == "unjoined"]
-    assert RouteTable.from_dataclass(setup.route).route("a.json").unjoined_stops == setup.route.unjoined_stops
+    assert RouteTable.from_dataclass(setup.route).to_route("a.json").unjoined_stops == setup.route.unjoined_stops
     if expected is None:
         assert not found
         return
