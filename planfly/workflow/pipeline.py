@@ -94,7 +94,7 @@ class OffNominal:
 
 @dataclass(frozen=True, slots=True)
 class FlightTask:
-    """How `fly_and_judge` flies, records and judges a setup.
+    """Settings with which `fly_and_judge` flies, records and judges a setup.
 
     log: file for the flight log; None writes no log.
     advance: called with the progress of the flight; None to report none.
