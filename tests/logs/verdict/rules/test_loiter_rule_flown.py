@@ -8,6 +8,8 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -126,6 +128,21 @@ def test_the_worst_of_a_circles_legs_is_told(
     assert folded == (replace(mine[told], reason=reason), *beside, other)
     # One alone is as it was.
     assert merge_loiter_findings(requirements, None, [mine[0], *beside]) == (mine[0], *beside)
+
+
+@pytest.mark.parametrize("outcomes", [(True, None, None), (None, True, None), (True, None, False)])
+def test_legs_of_a_px4_loiter_that_were_not_flown_are_not_judged(outcomes: tuple[bool | None, ...]) -> None:
+    """PX4 may leave the circle before its other legs; for ArduPlane, an unjudged leg comes before a passed one."""
+    setup = loiter()
+    by_px4 = replace(setup, autopilot=Px4(Px4Parameters.defaults()))
+    requirements = route_requirements(by_px4)
+    (circle,) = loiter_circles(requirements)
+    legs = [Place("leg", circle.first + k) for k in range(3)]
+    mine = [finding("slope", place, ok, 5.0) for place, ok in zip(legs, outcomes, strict=True)]
+    merged = merge_loiter_findings(requirements, None, mine)
+    assert [one.ok for one in merged] == [False not in outcomes]
+    by_ardupilot = merge_loiter_findings(route_requirements(setup), None, mine)
+    assert [one.ok for one in by_ardupilot] == [False if False in outcomes else None]
 
 
 @pytest.mark.parametrize(
