@@ -101,9 +101,10 @@ def test_the_last_line_of_progress_counts_every_flight(
 
     goal, told = Goal(None, False, 6), list[tuple[float, float, str]]()
     monkeypatch.setattr("planfly.campaigns.fly_campaign.worker_pool", lambda *_: nullcontext(AtOnce()))
+    monkeypatch.setattr("planfly.campaigns.worker_pool.REPORT_INTERVAL_S", 86_400.0)
     with open_store(base, goal, tmp_path, resume=False) as store:
         fly_campaign(base, goal, Workers(1), store, lambda *said: told.append(said))
-    # How many there are is said before the first; they were quicker than another line is due.
+    # How many there are is said before the first; no other line is due.
     assert [said[:2] for said in told] == [(0.0, 6.0), (6.0, 6.0)]
     assert told[-1][2].startswith("6 flights, probability ")
     assert told[-1][2].endswith(", 0 s left")
