@@ -1,7 +1,7 @@
 """Compare an imported flight with a simulated flight of the same mission: leg by leg, turn by turn."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -11,7 +11,7 @@ from flight.simulation.track import ROLL, THROTTLE, Track
 from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, project_onto_leg
-from logs.verdict.measures.turns import measure_turns
+from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -277,22 +277,24 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     )
 
 
-def _turn_pair(waypoint: int, planned_turn: float, flown: Mapping[str, float], model: Mapping[str, float]) -> TurnPair:
+def _turn_pair(waypoint: int, planned_turn: float, flown: TurnMeasure, model: TurnMeasure) -> TurnPair:
     """Compare the flown and the simulated turn at a waypoint.
 
     waypoint: index of the waypoint in the whole route.
     planned_turn: planned course change, rad.
-    flown, model: numbers of the turn in the imported and in the simulated flight, as from `measure_turns`.
+    flown, model: measures of the turn in the imported and in the simulated flight.
     """
 
     def value_pair(name: str, factor: float = 1.0) -> tuple[float, float]:
         """Return one quantity of the flown and the simulated turn, each times a factor; NaN if not measured."""
-        return flown.get(name, math.nan) * factor, model.get(name, math.nan) * factor
+        values = (getattr(flown, name), getattr(model, name))
+        flown_value, model_value = (math.nan if value is None else value * factor for value in values)
+        return flown_value, model_value
 
     return TurnPair(
         waypoint,
         math.degrees(planned_turn),
         overshoot=value_pair("overshoot"),
-        bank=value_pair("peak bank", 180.0 / math.pi),
-        passed=value_pair("distance"),
+        bank=value_pair("peak_bank", 180.0 / math.pi),
+        passed=value_pair("min_distance"),
     )

@@ -1,6 +1,8 @@
 """Measure how each turn was flown: angle, bank, radius, overshoot, and where the aircraft settled."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +15,44 @@ from logs.verdict.tolerances import SETTLING_WATCH_TIME_S
 from world.arrays import Floats
 
 
-def measure_turns(
-    requirements: RouteRequirements, aligned: AlignedTrack, *, follows_arcs: bool
-) -> list[dict[str, float]]:
-    """Measure the turn at every inner waypoint, in order; return the numbers of `measure_turn` for each.
+@dataclass(frozen=True, slots=True)
+class TurnMeasure:
+    """Measured turn; a field is None if the turn was not flown, or if there is nothing to measure.
+
+    angle, tolerance: course change and its tolerance, rad.
+    is_fitted: True if the courses of both legs are least-squares fits.
+    peak_bank: maximum bank, rad.
+    held_bank: maximum one-second mean of the bank, rad.
+    radius: minimum radius over one second, m.
+    overshoot: maximum distance outside the arc, and after the arc outside the next leg, m.
+    settled_distance: mean distance from the next leg in the last second before its end, m.
+    min_distance: minimum horizontal distance from the waypoint, m.
+    full_circles: number of full circles flown in addition to the planned turn.
+    is_complete: True if the flight went on after the turn.
+    pass_time: time of the closest approach to the waypoint, s; None if the flight was measured along planfly's arcs.
+    overrun: distance past the next leg's end at that time, m; 0 if the flight joined the next leg.
+    """
+
+    angle: float | None = None
+    tolerance: float | None = None
+    is_fitted: bool = False
+    peak_bank: float | None = None
+    held_bank: float | None = None
+    radius: float | None = None
+    overshoot: float | None = None
+    settled_distance: float | None = None
+    min_distance: float | None = None
+    full_circles: int = 0
+    is_complete: bool = False
+    pass_time: float | None = None
+    overrun: float = 0.0
+
+
+def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack, *, follows_arcs: bool) -> list[TurnMeasure]:
+    """Measure the turn at every inner waypoint, in order.
 
     follows_arcs: True for a flight along planfly's fly-by arcs; False to measure overshoot and minimum distance
-        relative to the corner of the two legs, and to add the numbers of `_closest_approaches`.
+        relative to the corner of the two legs.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.measures.route_requirements import route_requirements
@@ -27,32 +60,17 @@ def measure_turns(
     >>> log = example_log()
     >>> requirements = route_requirements(log.setup)
     >>> measures = measure_turns(requirements, align_track(requirements, log.track), follows_arcs=False)
-    >>> len(measures) == requirements.legs - 1, measures[0]["distance"] < 60.0
+    >>> len(measures) == requirements.legs - 1, measures[0].min_distance < 60.0
     (True, True)
     """
     measures = [measure_turn(requirements, aligned, waypoint) for waypoint in range(1, requirements.legs)]
-    if not follows_arcs:
-        for measure, approach in zip(measures, _closest_approaches(requirements, aligned), strict=True):
-            measure.pop("overshoot", None)
-            measure |= approach
-    return measures
+    return measures if follows_arcs else _with_closest_approaches(requirements, aligned, measures)
 
 
-def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> dict[str, float]:
-    """Measure the turn at an inner waypoint along its arc; return numbers by quantity, none if a leg was not flown.
-
-    A quantity that cannot be measured is left out:
-    course change, course tolerance: rad; fitted: True if the courses of both legs are least-squares fits.
-    peak bank, bank: maximum bank, and maximum one-second mean of the bank, rad.
-    radius: minimum radius over one second, m.
-    overshoot: maximum distance outside the arc, and after the arc outside the next leg, m.
-    settled: mean distance from the next leg in the last second before its end, m.
-    distance: minimum horizontal distance from the waypoint, m.
-    circles: number of full circles flown in addition to the planned turn.
-    complete: True if the flight went on after the turn.
-    """
+def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> TurnMeasure:
+    """Measure the turn at an inner waypoint along its arc; all fields have their defaults if a leg was not flown."""
     if not aligned.has_flown(waypoint - 1) or not aligned.has_flown(waypoint):
-        return {}
+        return TurnMeasure()
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (waypoint - 1, waypoint, waypoint + 1))
     position = track.position[first : last + 1]
@@ -83,16 +101,13 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoin
         lengths = np.maximum(distance_run[ticks:] - distance_run[:-ticks], 1e-6)
         max_curvature = float((np.abs(course[ticks:] - course[:-ticks]) / lengths).max())
         radius = 1.0 / max_curvature if max_curvature > 1e-9 else math.inf
-    measure = dict[str, float]()
     # Neither course is known if its leg was flown too little.
+    angle, tolerance, is_fitted = None, None, False
     course_before, course_after = (leg_course(requirements, aligned, leg) for leg in (waypoint - 1, waypoint))
     if course_before is not None and course_after is not None:
-        measure["course change"] = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
-        measure["course tolerance"] = course_before.tolerance + course_after.tolerance
-        measure["fitted"] = course_before.is_fitted and course_after.is_fitted
-    if not math.isnan(held_bank):
-        measure["peak bank"] = float(np.abs(track.attitude[rows_around, ROLL]).max())
-        measure["bank"] = held_bank
+        angle = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
+        tolerance = course_before.tolerance + course_after.tolerance
+        is_fitted = course_before.is_fitted and course_after.is_fitted
     is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
     is_watched &= track.time[first : last + 1] <= track.time[first + exit_row] + SETTLING_WATCH_TIME_S
     course_change = abs(float(aligned.course[first + exit_row] - aligned.course[first + entry_row]))
@@ -101,23 +116,26 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoin
     rows = np.arange(start, end_row + 1)
     rows = rows[distance_along[rows] >= requirements.length_after[waypoint]]
     settled_distance = float(np.abs(lateral_offset[rows]).mean()) if rows.size else float(abs(lateral_offset[end_row]))
-    overshoot = _arc_overshoot(
-        requirements,
-        waypoint,
-        position[is_watched],
-        distance_along_before[is_watched],
-        distance_along[is_watched],
-        lateral_offset[is_watched],
+    return TurnMeasure(
+        angle=angle,
+        tolerance=tolerance,
+        is_fitted=is_fitted,
+        peak_bank=None if math.isnan(held_bank) else float(np.abs(track.attitude[rows_around, ROLL]).max()),
+        held_bank=None if math.isnan(held_bank) else held_bank,
+        radius=radius,
+        overshoot=_arc_overshoot(
+            requirements,
+            waypoint,
+            position[is_watched],
+            distance_along_before[is_watched],
+            distance_along[is_watched],
+            lateral_offset[is_watched],
+        ),
+        settled_distance=settled_distance,
+        min_distance=float(closest_approaches(position, requirements.points[waypoint])[0].min()),
+        full_circles=max(0, round((course_change - abs(float(requirements.turns[waypoint]))) / (2.0 * math.pi))),
+        is_complete=bool(aligned.passed[waypoint + 1] or end_row < last - first or exit_row < last - first),
     )
-    if overshoot is not None:
-        measure["overshoot"] = overshoot
-    return measure | {
-        "radius": radius,
-        "settled": settled_distance,
-        "distance": float(closest_approaches(position, requirements.points[waypoint])[0].min()),
-        "circles": max(0, round((course_change - abs(float(requirements.turns[waypoint]))) / (2.0 * math.pi))),
-        "complete": bool(aligned.passed[waypoint + 1] or end_row < last - first or exit_row < last - first),
-    }
 
 
 def _first_row(mask: NDArray[np.bool_], default: int) -> int:
@@ -172,13 +190,16 @@ def _arc_overshoot(
 NEXT_LEG_FRACTION = 0.7
 
 
-def _closest_approaches(requirements: RouteRequirements, aligned: AlignedTrack) -> list[dict[str, float]]:
-    """Measure the turn at every inner waypoint, in order, relative to the corner instead of the arc.
+def _with_closest_approaches(
+    requirements: RouteRequirements, aligned: AlignedTrack, measures: Sequence[TurnMeasure]
+) -> list[TurnMeasure]:
+    """Return the turn measures with overshoot and minimum distance relative to the corner instead of the arc.
 
-    pass time: time of the closest approach to the waypoint, s; distance: of that approach, m.
-    overshoot: maximum distance from the next leg on the outside of the turn, up to `NEXT_LEG_FRACTION` of that leg or
-        the closest approach to the next waypoint, whichever is sooner, m.
-    overrun: instead of the overshoot, the distance past the next leg's end if the aircraft was already there, m.
+    measures: measures of the turns at all inner waypoints, in order.
+
+    The overshoot is the maximum distance from the next leg on the outside of the turn, up to `NEXT_LEG_FRACTION` of
+    that leg or the closest approach to the next waypoint, whichever is sooner.  It is None if the aircraft was already
+    beyond the end of that leg.
     """
     track_time, rows = aligned.track.time, aligned.rows
     # Time and distance of the closest approach to each waypoint; the times never decrease.
@@ -193,9 +214,10 @@ def _closest_approaches(requirements: RouteRequirements, aligned: AlignedTrack) 
         row = int(np.argmin(distances))
         start_time = float(times[row] + fractions[row] * (times[row + 1] - times[row]))
         nearest_passes.append((start_time, float(distances[row])))
-    measures = []
-    for k in range(1, requirements.legs):
+    passed_turns = []
+    for k, measure in enumerate(measures, 1):
         time, distance = nearest_passes[k]
+        overshoot, overrun = None, 0.0
         earliest_time, later_passes = time + aligned.tick, nearest_passes[k + 1 :]
         next_time = next((later for later, _ in later_passes if later > earliest_time), float(track_time[-1]))
         leg_length, positions = float(requirements.runs[k]), _track_between(aligned, time, next_time)[1]
@@ -204,18 +226,19 @@ def _closest_approaches(requirements: RouteRequirements, aligned: AlignedTrack) 
         end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
         outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
         if distance_along[0] > leg_length:
+            # The aircraft was already beyond the end of the next leg.
             overrun = float(distance_along[0]) - leg_length
-            measures.append({"distance": distance, "pass time": time, "overrun": overrun})
-            continue
-        overshoot = max(0.0, float(outside_offset[: max(1, end_row)].max()))
-        if 0 < end_row < len(distance_along):
+        else:
+            overshoot = max(0.0, float(outside_offset[: max(1, end_row)].max()))
+        if overshoot is not None and 0 < end_row < len(distance_along):
             # Interpolate to the exact end: rows may be a second apart.
             along_before, along = distance_along[end_row - 1 : end_row + 1].tolist()
             offset_before, offset = outside_offset[end_row - 1 : end_row + 1].tolist()
             fraction = (NEXT_LEG_FRACTION * leg_length - along_before) / (along - along_before)
             overshoot = max(overshoot, offset_before + fraction * (offset - offset_before))
-        measures.append({"distance": distance, "pass time": time, "overshoot": overshoot})
-    return measures
+        measured_pass = replace(measure, overshoot=overshoot, min_distance=distance, pass_time=time, overrun=overrun)
+        passed_turns.append(measured_pass)
+    return passed_turns
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:

@@ -1,7 +1,6 @@
 """The turn rule: judge whether the turn at each corner fits its legs, and how it was flown."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from logs.verdict.measures.acceptance import acceptance_limit, negligible_kink_d
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.turns import measure_turns
+from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_gentler_turn
 from logs.verdict.tolerances import (
@@ -39,7 +38,7 @@ def turn_findings(
 
     geometric: True to judge the planned turns only.
     """
-    measures: list[dict[str, float] | None] = [None if geometric else {}] * (requirements.legs - 1)
+    measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         follows_arcs = requirements.setup.imported_log is None
         measures = [*measure_turns(requirements, aligned, follows_arcs=follows_arcs)]
@@ -52,11 +51,11 @@ def turn_findings(
 
 
 def _turn_finding(
-    requirements: RouteRequirements, waypoint: int, measure: Mapping[str, float] | None, aligned: AlignedTrack | None
+    requirements: RouteRequirements, waypoint: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
     """Judge the turn at a waypoint; a turn next to a vertical leg is not judged.
 
-    measure: numbers of the flown turn, as from `measure_turns`; None to judge only the planned turn.
+    measure: measurements of the flown turn; None to judge only the planned turn.
     """
     planned_turn = abs(float(requirements.turns[waypoint]))
     limit, source = turn_limit(requirements, waypoint)
@@ -78,35 +77,32 @@ def _turn_finding(
                 f"flown over, because a fly-by arc would pass {offset:.0f} m away, outside the acceptance radius of"
                 f" {acceptance_radius:.0f} m; after the waypoint the turn swings up to {lateral:.0f} m off the next leg"
             )
-    angle = None if measure is None else measure.get("course change")
+    angle = None if measure is None else measure.angle
     tolerance = PLAN_TOLERANCE_RAD
     if measure is not None:
         if not is_judged_as_planned:
-            tolerance = measure.get("course tolerance") or PLAN_TOLERANCE_RAD
+            tolerance = measure.tolerance or PLAN_TOLERANCE_RAD
             judged_turn = planned_turn if angle is None else angle
         flown_faults = _flown_faults(requirements, waypoint, measure, limit)
         facts += [text for name, text in _flown_facts(requirements, waypoint, measure) if name not in flown_faults]
         facts += [fault.brief for fault in flown_faults.values()] if is_judged_as_planned else []
         faults += [] if is_judged_as_planned else flown_faults.values()
     ok: bool | None = False if faults else None if check else True
-    if measure is not None and not measure.get("complete"):
+    if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, waypoint, measure, aligned))
         ok = None if ok is not False else False
     method, measured_facts = "route", []
     if measure is not None:
-        fit_text = "least-squares courses of both legs" if measure.get("fitted") else "course change over the turn"
-        method = "not flown" if angle is None else fit_text
-        measured_facts = [
-            Fact(name, math.degrees(measure[key]) if unit == "deg" else measure[key], unit)
-            for name, key, unit, is_stated in (
-                ("overshoot", "overshoot", "m", True),
-                ("settled", "settled", "m", measure.get("complete")),
-                ("bank", "bank", "deg", True),
-                ("radius", "radius", "m", True),
-                ("nearest pass", "distance", "m", "pass time" in measure),
-            )
-            if is_stated and key in measure
-        ]
+        fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
+        method = "not flown" if measure.angle is None else fit_text
+        quantities = (
+            ("overshoot", measure.overshoot, "m"),
+            ("settled", measure.settled_distance if measure.is_complete else None, "m"),
+            ("bank", None if measure.held_bank is None else math.degrees(measure.held_bank), "deg"),
+            ("radius", measure.radius, "m"),
+            ("nearest pass", None if measure.pass_time is None else measure.min_distance, "m"),
+        )
+        measured_facts = [Fact(quantity, value, unit) for quantity, value, unit in quantities if value is not None]
     return make_finding(
         "turn",
         requirements.waypoint_place(waypoint),
@@ -180,13 +176,13 @@ def _judge_planned_turn(
 
 
 def _unflown_turn_text(
-    requirements: RouteRequirements, waypoint: int, measure: Mapping[str, float], aligned: AlignedTrack | None
+    requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, aligned: AlignedTrack | None
 ) -> str:
     """Explain why a turn was not flown: the flight ended before it, or the autopilot skipped a leg.
 
     For an imported flight, the text only states that the legs were not flown one after the other.
     """
-    if "pass time" in measure:
+    if measure.pass_time is not None:
         return "its legs were not flown one after the other"
     if aligned is None or int(aligned.guidance_legs.max()) < waypoint:
         return "the flight did not get past it"
@@ -203,45 +199,45 @@ def _unflown_turn_text(
     )
 
 
-def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: Mapping[str, float]) -> list[tuple[str, str]]:
+def _flown_facts(requirements: RouteRequirements, waypoint: int, measure: TurnMeasure) -> list[tuple[str, str]]:
     """Return the measured quantities of a flown turn, as pairs of name and text."""
     facts = []
-    if "course change" in measure:
-        facts.append(("course change", f"flown course change {math.degrees(measure['course change']):.2f}°"))
-    if "peak bank" in measure:
-        facts.append(("bank", f"bank up to {math.degrees(measure['peak bank']):.1f}°"))
-    if measure.get("radius", math.inf) < STRAIGHT_RADIUS_RATIO * requirements.radius[waypoint]:
-        facts.append(("radius", f"radius {measure['radius']:.0f} m"))
-    if "pass time" in measure:
-        facts.append(("nearest pass", f"nearest pass {measure['distance']:.1f} m, at {measure['pass time']:.1f} s"))
-    if "overshoot" in measure:
-        facts.append(("overshoot", f"overshoot {measure['overshoot']:.1f} m"))
-    if "overrun" in measure:
-        overrun_text = f"passed {measure['overrun']:.0f} m beyond the end of the next leg, which was not joined"
+    if measure.angle is not None and measure.tolerance is not None:
+        facts.append(("course change", f"flown course change {math.degrees(measure.angle):.2f}°"))
+    if measure.peak_bank is not None and measure.held_bank is not None:
+        facts.append(("bank", f"bank up to {math.degrees(measure.peak_bank):.1f}°"))
+    if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[waypoint]:
+        facts.append(("radius", f"radius {measure.radius:.0f} m"))
+    if measure.pass_time is not None and measure.min_distance is not None:
+        facts.append(("nearest pass", f"nearest pass {measure.min_distance:.1f} m, at {measure.pass_time:.1f} s"))
+    if measure.overshoot is not None:
+        facts.append(("overshoot", f"overshoot {measure.overshoot:.1f} m"))
+    if measure.overrun:
+        overrun_text = f"passed {measure.overrun:.0f} m beyond the end of the next leg, which was not joined"
         facts.append(("overrun", overrun_text))
-    if "settled" in measure and measure.get("complete"):
-        facts.append(("settled", f"settled to {measure['settled']:.2f} m from the next leg"))
+    if measure.settled_distance is not None and measure.is_complete:
+        facts.append(("settled", f"settled to {measure.settled_distance:.2f} m from the next leg"))
     return facts
 
 
 def _flown_faults(
-    requirements: RouteRequirements, waypoint: int, measure: Mapping[str, float], limit: float
+    requirements: RouteRequirements, waypoint: int, measure: TurnMeasure, limit: float
 ) -> dict[str, Message]:
     """Return the faults of a flown turn by measured quantity: a name as in `_flown_facts`, or "circles".
 
     limit: largest permitted course change, rad.
     """
     faults, setup = {}, requirements.setup
-    if "course change" in measure and measure["course change"] > limit + measure["course tolerance"]:
-        flown_angle, max_angle = math.degrees(measure["course change"]), math.degrees(limit)
+    if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
+        flown_angle, max_angle = math.degrees(measure.angle), math.degrees(limit)
         faults["course change"] = message(
             f"flown course change {flown_angle:.1f}°, more than the limit of {max_angle:.1f}°"
         )
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
     # The one-second mean is judged, because gusts and the roll into the turn change the bank only for a moment.
-    if measure.get("bank", 0.0) > max_bank:
+    if measure.held_bank is not None and measure.held_bank > max_bank:
         faults["bank"] = message(
-            f"bank {math.degrees(measure['bank']):.1f}°, more than the limit of {math.degrees(max_bank):.1f}°"
+            f"bank {math.degrees(measure.held_bank):.1f}°, more than the limit of {math.degrees(max_bank):.1f}°"
         )
     # A flight along the arc between legs that are too short for their turn exceeded the bank limit or slowed down.
     turn, min_radius = abs(float(requirements.turns[waypoint])), float(requirements.min_radius[waypoint])
@@ -251,27 +247,27 @@ def _flown_faults(
     follows_arc = (
         setup.autopilot.turns.keeps_to_arcs and setup.imported_log is None and not setup.route.fly_over[waypoint]
     )
-    if "distance" in measure and math.isfinite(min_distance) and follows_arc:
+    if measure.min_distance is not None and math.isfinite(min_distance) and follows_arc:
         tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
         tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
-        if measure["distance"] < min_distance - tolerance:
+        if measure.min_distance < min_distance - tolerance:
             faults["radius"] = message(
-                f"passes its waypoint {measure['distance']:.1f} m away, closer than the bank limit permits",
+                f"passes its waypoint {measure.min_distance:.1f} m away, closer than the bank limit permits",
                 f"; an arc at {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind (radius"
                 f" {min_radius:.0f} m) passes the waypoint {min_distance:.1f} m away",
             )
-    if measure.get("overshoot", 0.0) > OVERSHOOT_TOLERANCE_M:
-        passed_text = "its next leg" if "pass time" in measure else "its arc"
-        overshoot_text, _ = compared_texts(measure["overshoot"], OVERSHOOT_TOLERANCE_M, "m", 0)
+    if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
+        passed_text = "its arc" if measure.pass_time is None else "its next leg"
+        overshoot_text, _ = compared_texts(measure.overshoot, OVERSHOOT_TOLERANCE_M, "m", 0)
         faults["overshoot"] = message(
             f"overshoots {passed_text} by {overshoot_text}", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
         )
     max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[setup.scenario.wind.turbulence]
-    if measure.get("complete") and measure.get("settled", 0.0) > max_offset:
-        offset_text, max_text = compared_texts(measure["settled"], max_offset, "m", 1)
+    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
+        offset_text, max_text = compared_texts(measure.settled_distance, max_offset, "m", 1)
         faults["settled"] = message(f"still {offset_text} off the next leg at its end", f" (at most {max_text})")
-    if measure.get("circles"):
-        faults["circles"] = message(f"{count_text(int(measure['circles']), 'full circle')} flown at the corner")
+    if measure.full_circles:
+        faults["circles"] = message(f"{count_text(measure.full_circles, 'full circle')} flown at the corner")
     return faults
 
 

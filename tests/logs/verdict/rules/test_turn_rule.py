@@ -11,7 +11,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.measures.turns import measure_turn
+from logs.verdict.measures.turns import TurnMeasure, measure_turn
 from logs.verdict.places import Place
 from logs.verdict.rules.turn_rule import _unflown_turn_text
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint
@@ -99,7 +99,7 @@ def test_overshoot(setup: FlightSetup, height: float, ok: bool) -> None:
     requirements = route_requirements(setup)
     flown = align_track(requirements, track)
     assert flown is not None
-    assert measure_turn(requirements, flown, 1)["overshoot"] == pytest.approx(max(0.0, -height), abs=0.1)
+    assert measure_turn(requirements, flown, 1).overshoot == pytest.approx(max(0.0, -height), abs=0.1)
 
 
 def test_an_overshoot_within_the_arc_is_seen(setup: FlightSetup) -> None:
@@ -180,7 +180,7 @@ def test_a_leg_that_the_autopilot_left_at_once_is_the_reason_that_is_given() -> 
 
     def why(seconds: float, last: int) -> str:
         leg = np.select([track.time < track.time[start], track.time < track.time[start] + seconds], [1, 2], last)
-        return _unflown_turn_text(requirements, 2, {}, align_track(requirements, replace(track, leg=leg)))
+        return _unflown_turn_text(requirements, 2, TurnMeasure(), align_track(requirements, replace(track, leg=leg)))
 
     counts = "the leg is 40 m long, and a waypoint counts as reached within"
     assert f"{short.autopilot.title} flew leg 2 (to item 3) for only 1.0 s: {counts}" in why(1.0, 3)

@@ -12,7 +12,7 @@ from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures import turns
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.measures.turns import measure_turn
+from logs.verdict.measures.turns import TurnMeasure, measure_turn
 from logs.verdict.rules.turn_rule import turn_findings
 from tests.logs.verdict.judging import ROUTE, judge, of, waypoint
 from tests.logs.verdict.unsure_aircraft import with_guessed_bank
@@ -64,7 +64,7 @@ def test_gusts_may_keep_a_turn_from_settling(turbulence: str, sigma: float, offs
     assert of(judge(gusty, track, envelope=False), "turn", waypoint(1)).ok is ok
 
 
-def judged(setup: FlightSetup, measure: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> Finding:
+def judged(setup: FlightSetup, measure: TurnMeasure, monkeypatch: pytest.MonkeyPatch) -> Finding:
     """The finding of waypoint 1, however it was flown, by flown evidence alone."""
     requirements = route_requirements(setup, envelope=False)
     aligned = align_track(requirements, fly_path(setup))
@@ -90,7 +90,7 @@ def test_a_turn_may_pass_its_waypoint_a_little_closer_than_the_bank_limits_arc(
     radius = bank_radius(25.0 + off)
     least = radius - 0.01 * radius - tolerance
     for spare, ok in ((0.1, True), (-0.1, False)):
-        measure = {"distance": least + spare, "complete": True}
+        measure = TurnMeasure(min_distance=least + spare, is_complete=True)
         assert judged(setup, measure, monkeypatch).ok is ok
 
 
@@ -98,7 +98,7 @@ def test_a_turn_may_pass_its_waypoint_a_little_closer_than_the_bank_limits_arc(
 def test_a_nearly_straight_flight_has_no_radius_to_tell(
     radii: float, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    measure = {"radius": radii * bank_radius(), "complete": True}
+    measure = TurnMeasure(radius=radii * bank_radius(), is_complete=True)
     assert ("radius" in judged(make_setup(corner(60.0)), measure, monkeypatch).reason) is said
 
 
@@ -107,13 +107,13 @@ def test_a_flown_angle_is_beyond_the_limit_where_it_is_beyond_its_tolerance(
     degrees: float, ok: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     setup = make_setup(corner(50.0), limits={"max_turn_deg": 60.0})
-    measure = {"course change": math.radians(degrees), "course tolerance": math.radians(0.2), "complete": True}
+    measure = TurnMeasure(angle=math.radians(degrees), tolerance=math.radians(0.2), is_complete=True)
     assert judged(setup, measure, monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("circles", "ok"), [(0, True), (1, False)])
 def test_no_full_circle_is_flown_at_a_corner(circles: int, ok: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert judged(make_setup(corner(60.0)), {"circles": circles, "complete": True}, monkeypatch).ok is ok
+    assert judged(make_setup(corner(60.0)), TurnMeasure(full_circles=circles, is_complete=True), monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("seconds", "seen"), [(9.0, True), (11.0, False)])
@@ -124,7 +124,7 @@ def test_a_turn_is_watched_for_ten_seconds_after_its_arc(seconds: float, seen: b
     requirements = route_requirements(setup)
     aligned = align_track(requirements, fly_path(setup, across=bump(arc_ends + 25.0 * seconds, -1.0, 4.0)))
     assert aligned is not None
-    overshoot = measure_turn(requirements, aligned, 1)["overshoot"]
+    overshoot = measure_turn(requirements, aligned, 1).overshoot
     assert overshoot == pytest.approx(1.0 if seen else 0.0, abs=0.1)
 
 
