@@ -25,11 +25,11 @@ from world.frames import to_geo
 from world.scenario import Scenario
 from world.wording import count_text
 
-# Verb phrases for the outcome of one return.
+# Verb phrases for the outcome of one return; `limit` and `zones` are filled in.
 _SINGULAR_TEXTS: dict[Kind, str] = {
     "ground": "hits the ground",
     "threat": "enters a missile's sphere",
-    "zone": "violates a zone",
+    "zone": "violates {zones}",
     "lost": "does not arrive",
     "energy": "uses more energy than allowed",
     "unknown": "flies where the terrain is unknown",
@@ -42,7 +42,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
 _PLURAL_TEXTS: dict[Kind, str] = {
     "ground": "hit the ground",
     "threat": "enter a missile's sphere",
-    "zone": "violate a zone",
+    "zone": "violate {zones}",
     "lost": "do not arrive",
     "energy": "use more energy than allowed",
     "unknown": "fly where the terrain is unknown",
@@ -138,7 +138,7 @@ def outcome_text(ret: SimulatedReturn, limit: float) -> str:
         side, (east, north) = "outside" if ret.violation.is_inclusion else "inside", ret.violation.position
         depth_text = quantity_text(ret.violation.depth, "m")
         return f"is {depth_text} {side} zone {ret.violation.name} at {east:.0f} m east, {north:.0f} m north"
-    return "is safe" if ret.safe else _SINGULAR_TEXTS[ret.kind].format(limit=limit)
+    return "is safe" if ret.safe else _SINGULAR_TEXTS[ret.kind].format(limit=limit, zones="a zone")
 
 
 def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str:
@@ -172,15 +172,12 @@ def _kind_text(returns: Returns, kind: Kind, *, is_plural: bool) -> str:
 
     is_plural: True for a verb in the plural.
     """
-    text = (_PLURAL_TEXTS if is_plural else _SINGULAR_TEXTS)[kind].format(limit=returns.limit)
-    names = list(
-        dict.fromkeys(ret.violation.name for ret in returns.each if ret.kind == "zone" and ret.violation is not None)
-    )
-    if kind != "zone" or not names:
-        return text
+    violations = [ret.violation for ret in returns.each if ret.kind == "zone" and ret.violation is not None]
+    names = list(dict.fromkeys(violation.name for violation in violations))
     more_text = f" and {len(names) - _MAX_NAMED_ZONES} more" if len(names) > _MAX_NAMED_ZONES else ""
-    noun = "zone" if len(names) == 1 else "zones"
-    return text.replace("a zone", f"{noun} {', '.join(names[:_MAX_NAMED_ZONES])}{more_text}")
+    zones_text = f"{'zone' if len(names) == 1 else 'zones'} {', '.join(names[:_MAX_NAMED_ZONES])}{more_text}"
+    texts = _PLURAL_TEXTS if is_plural else _SINGULAR_TEXTS
+    return texts[kind].format(limit=returns.limit, zones=zones_text if names else "a zone")
 
 
 def returns_headline(returns: Returns) -> str:
