@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.edits import movable_indices
-from flight.mission.items import AMSL, OVER_HOME, Command, Mission, MissionItem, command_name
+from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Command, Mission, MissionItem, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.document import finding_document
@@ -170,7 +170,10 @@ def windows_json(mission: Mission, route: Route, windows: Sequence[Window]) -> J
 
 
 def items_json(context: EditContext, mission: Mission) -> list[Json]:
-    """Return page data of the items that can be moved, with their positions on the map and in the mission."""
+    """Return page data of the items that can be moved, with their positions on the map and in the mission.
+
+    A landing has a touchdown at a known altitude, while the route ends above it, at the altitude of the previous item.
+    """
     points, flown_seqs = context.item_positions(mission), context.reached_items(mission)
     entries = []
     for k, (east, north, altitude) in zip(movable_indices(mission), points.tolist(), strict=True):
@@ -186,6 +189,7 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
                 "lat": item.lat_deg,
                 "lon": item.lon_deg,
                 "state": "" if item.seq in flown_seqs else "not flown",
+                "touchdown": item.command in LANDINGS and math.isfinite(altitude),
             }
         )
     return entries

@@ -165,7 +165,7 @@ export class Hands {
     const { app } = this, model = app.model(), item = model.items.find((one) => one.k === k);
     if (!item) return;
     // An item with a height above ground moves vertically with the terrain: take its height from the newest route.
-    const passed = place ? model.of.indexOf(k) : -1, up = place?.up ?? (passed < 0 ? item.at[2] : model.route[passed][2]);
+    const passed = place ? model.of.indexOf(k) : -1, up = place?.up ?? (passed < 0 || item.touchdown ? item.at[2] : model.route[passed][2]);
     const [east, north] = place ? [place.east, place.north] : item.at;
     const unseen = model.of.includes(k) || item.at[2] === null ? [] : ["not flown"];
     const rows = model.states.corners.filter((_, i) => model.of[i] === k).concat(legStates(model, k));

@@ -73,8 +73,15 @@ export class Profile {
     this.drawDots();
   }
 
+  // Return the altitude at which an item's dot lies, m: that of the touchdown for a landing, above which the route ends.
+  dotAltitude(k, i) {
+    const item = this.model.items.find((one) => one.k === k);
+    return item?.touchdown ? item.at[2] : this.model.route[i][2];
+  }
+
   range(ground) {
-    const ups = this.model.route.map((p) => p[2]);
+    const touchdowns = this.model.items.filter((one) => one.touchdown).map((one) => one.at[2]);
+    const ups = [...this.model.route.map((p) => p[2]), ...touchdowns];
     const heights = [...ups, ...ground.map((p) => p[1]), ...(this.flown?.track || []).map((p) => p[2])];
     const low = Math.min(...heights), high = Math.max(...heights), rim = Math.max(20, 0.1 * (high - low));
     this.low = low - rim;
@@ -154,8 +161,13 @@ export class Profile {
     this.model.of.forEach((k, i) => {
       if (k < 0 || seen.has(k)) return;
       seen.add(k);
-      const x = this.x(this.at[i]), y = this.y(this.model.route[i][2]);
-      this.places.push({ k, x, y, up: this.model.route[i][2] });
+      const up = this.dotAltitude(k, i), x = this.x(this.at[i]), y = this.y(up);
+      this.places.push({ k, x, y, up });
+      if (i && up !== this.model.route[i][2]) {
+        const start = `${this.x(this.at[i - 1]).toFixed(1)} ${this.y(this.model.route[i - 1][2]).toFixed(1)}`;
+        const glide = svg("path", { d: `M${start}L${x.toFixed(1)} ${y.toFixed(1)}`, class: "glide" }, this.dots);
+        svg("title", {}, glide).textContent = "glide to the touchdown";
+      }
       const state = worst.get(k)?.[0] || "ok";
       if (many && k !== this.selected) (many[state] ||= []).push(`M${x.toFixed(1)} ${y.toFixed(1)}h.01`);
       else svg("circle", { cx: x, cy: y, r: 5.5, class: `dot ${state}${k === this.selected ? " selected" : ""}` }, this.dots);

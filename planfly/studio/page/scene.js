@@ -147,6 +147,14 @@ export class Scene {
       pen.lineWidth = state === "fail" ? 5 : 4;
       this.line(pen, points);
     }
+    pen.strokeStyle = this.colour("quiet");
+    pen.lineWidth = 1.5;
+    pen.setLineDash([5, 4]);
+    for (const item of model.items.filter((one) => one.touchdown)) {
+      const end = model.of.indexOf(item.k);
+      if (end > 0 && item.at[2] !== model.route[end][2]) this.line(pen, [model.route[end - 1], item.at]);
+    }
+    pen.setLineDash([]);
     pen.strokeStyle = this.colour("flown");
     pen.lineWidth = 1.3;
     if (flown?.track?.length) this.line(pen, flown.track);

@@ -461,11 +461,12 @@ const app = {
     now.dragging.drop = hands.drop?.k === k ? hands.drop : null;
   },
   raised(k, up) {
-    now.dragging.drop = { ...(now.model.items.find((one) => one.k === k) || {}), k, up };
     const item = now.model.items.find((one) => one.k === k);
     now.dragging.drop = { east: item.at[0], north: item.at[1], up };
     hold();
-    now.model = { ...now.model, profile: now.model.profile, route: now.model.route.map((p, i) => (now.model.of[i] === k ? [p[0], p[1], up] : p)) };
+    // The route ends above a landing, at an altitude that the landing does not change.
+    if (item.touchdown) now.model = placed(now.model, k, { up });
+    else now.model = { ...now.model, route: now.model.route.map((p, i) => (now.model.of[i] === k ? [p[0], p[1], up] : p)) };
     profile.show(now.model, now.world, now.grid, shownFlight());
   },
   cancel() {

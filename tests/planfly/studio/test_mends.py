@@ -22,6 +22,7 @@ from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG_WORKER, Jobs
 from planfly.studio.server import NO_TOKEN, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
+from planfly.studio.view_model import mission_json
 from planfly.studio.worker_process import Answer, Task
 from planner.plan import read_plan
 from tests.planfly.made_plans import default_run
@@ -61,6 +62,11 @@ def test_all_are_raised_but_the_landing_and_its_height_is_its_touchdowns() -> No
     assert session.mission.items[1].alt == flight_to_the_ground().items[1].alt + 25.0
     session.edit(messages.Move(kind="move", rev=session.rev, k=8, up=landing.alt + 1.0))
     assert session.mission.items[-1].alt == pytest.approx(landing.alt + 1.0)
+    # The page draws the touchdown, not the end of the route, which is at the altitude of the waypoint before it.
+    shown = mission_json(session.context, session.judged)
+    assert [item["k"] for item in shown["items"] if item["touchdown"]] == [8]
+    assert shown["items"][-1]["at"][2] == pytest.approx(landing.alt + 1.0, abs=0.05)
+    assert shown["route"][-1][2] == pytest.approx(session.item_position(6)[2], abs=0.05)
 
 
 def test_a_waypoint_before_a_landing_is_not_halfway_to_the_ground() -> None:

@@ -511,6 +511,28 @@ def test_the_profile_has_a_gap_where_the_ground_is_not_known(page: Browser) -> N
         assert np.ravel(parts) == pytest.approx([start, before, end, end], abs=0.1)
 
 
+# A profile of a waypoint at 600 m and a landing at 310 m: altitudes of the dots, as kept and as drawn, and of the ends
+# of the dashed glide.
+LANDING = """import('/profile.js').then(({ Profile }) => {
+  const profile = new Profile(document.createElementNS('http://www.w3.org/2000/svg', 'svg'));
+  const states = { legs: [['ok', '']], corners: [['ok', ''], ['ok', '']] };
+  const items = [{ k: 0, seq: 1, at: [0, 0, 600] }, { k: 1, seq: 2, at: [400, 0, 310], touchdown: true }];
+  profile.resize(600, 200);
+  profile.show({ route: [[0, 0, 600], [400, 0, 600]], of: [0, 1], items, states, profile: null }, {}, null, null);
+  const dots = [...profile.root.querySelectorAll('.dot')].map((one) => Number(one.getAttribute('cy')));
+  const glide = profile.root.querySelector('.glide').getAttribute('d').match(/[\\d.]+/g).map(Number);
+  const altitudes = (places) => places.map((y) => profile.upAt(y));
+  return [profile.places.map((one) => one.up), altitudes(dots), altitudes([glide[1], glide[3]])];
+})"""
+
+
+def test_the_dot_of_a_landing_lies_at_its_touchdown_and_the_glide_ends_there(page: Browser) -> None:
+    places, dots, glide = page.value(LANDING)
+    assert places == [600, 310]
+    assert dots == pytest.approx([600.0, 310.0], abs=1e-6)
+    assert glide == pytest.approx([600.0, 310.0], abs=0.2)
+
+
 # The verdict's panel with findings by geometry and of a flight: titles, and each place with what is offered there.
 FINDINGS = """import('/panel.js').then(({ Panel }) => {
   const sent = [], raise = { text: 'raise it', apply: true }, verdict = { state: 'fail', answer: 'not flyable',
