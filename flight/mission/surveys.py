@@ -585,7 +585,8 @@ def _make_survey(
     line_pairs = pairwise(lines)
     if not has_photos or all((camera[line.last : following.first] != 0.0).all() for line, following in line_pairs):
         lines = _remove_leads(points, lines, turn_arounds)
-    first_leg = points[run_start + 1, :2] - points[run_start, :2]
+    # The first line may begin after the start of its run, which can contain the way to the survey.
+    first_leg = points[lines[0].first + 1, :2] - points[lines[0].first, :2]
     course = math.atan2(*first_leg)
     return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
 

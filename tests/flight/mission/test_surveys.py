@@ -303,10 +303,15 @@ def test_two_surveys_of_one_mission() -> None:
     assert math.degrees(second.course - first.course) == pytest.approx(90.0, abs=0.1)
 
 
+def _camera(k: int) -> str:
+    """The item that switches the camera on at the first place of a line, and off at the second."""
+    return f"2 206 {0 if k % 2 else 25} 0 1 0 0 0 0"
+
+
 def with_camera(*places: Place) -> tuple[Mission, Route]:
     lines: list[str] = []
     for k, (east, north) in enumerate(places):
-        lines += [wp(east, north), f"2 206 {0 if k % 2 else 25} 0 1 0 0 0 0"]
+        lines += [wp(east, north), _camera(k)]
     read = mission(*lines, home="36.5 -84.2 0")
     return read, make_route(read, ORIGIN, None, 15.0, False)
 
@@ -316,6 +321,16 @@ def test_the_camera_between_photos() -> None:
     assert camera_spacing(read, route).tolist() == [25.0, 0.0] * 4
     [found] = find_surveys(route, camera_spacing(read, route))
     assert all((line.photo, line.camera_on_at, line.camera_off_at) == (25.0, *line[:2]) for line in found.lines)
+
+
+def test_the_course_of_the_first_line_is_not_that_of_the_way_to_it() -> None:
+    """From 600 m south and 20 m west the way is on course 1.9 degrees, close enough for one straight run."""
+    lines = [wp(-20, -600), *(line for k, place in enumerate(grid(count=3)) for line in (wp(*place), _camera(k)))]
+    read = mission(*lines, home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert (found.lines[0].begins, found.lines[0].first) == (0, 1)
+    assert math.degrees(found.course) == pytest.approx(0.0, abs=0.1)
 
 
 def gated_grid(photo: float = 25.0, *, in_turns: bool = False) -> tuple[Mission, Route]:
