@@ -41,7 +41,8 @@ class LineMeasure:
     max_lateral_offset: maximum distance to the side of the line, m.
     max_height_error: maximum height error, m, positive above; NaN if unknown everywhere.
     planned_photo_count, missed_photo_count: number of planned photos, and how many of them are missed, also because the
-        camera is too slow; both 0 if no distance between photos is stated.
+        camera is too slow; both 0 if no distance between photos is stated.  No photo is missed if one is taken at each
+        planned position, or shifted by less than the distance between two photos.
     taken_photo_count: number of photos that the camera takes on the line, counted from where it is switched on.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
@@ -178,11 +179,16 @@ def measure_line(
         line.photo,
         np.interp(step_middles, along[is_ahead][order], speeds) if speeds.size else np.zeros(len(step_middles)),
     )
-    planned_photo_count, missed_photo_count = _count_photos(line, is_taken, length, spacing)
     # Photos taken on the line, up to `PHOTO_STEP_M` beyond its ends.
     photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
     photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
     is_between_ends = (rows.along >= -PHOTO_STEP_M) & (rows.along <= rows.axis.length + PHOTO_STEP_M)
+    is_on_photo_line = rows.is_ahead & rows.conditions["off_line"] & is_between_ends
+    taken_photo_count = int(np.count_nonzero(is_on_photo_line[photo_rows]))
+    planned_photo_count, missed_photo_count = _count_photos(line, is_taken, length, spacing)
+    if missed_photo_count:
+        # A camera that is switched on too early or too late also shifts the photos along the line.
+        missed_photo_count = max(missed_photo_count, planned_photo_count - taken_photo_count)
     return LineMeasure(
         length=length,
         usable=float(is_good.mean()),
@@ -197,9 +203,7 @@ def measure_line(
         min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
         lost_spans=_runs_of_set_steps(~is_kept, step),
         unknown_spans=_runs_of_set_steps(is_kept & ~is_good, step),
-        taken_photo_count=int(
-            np.count_nonzero((rows.is_ahead & rows.conditions["off_line"] & is_between_ends)[photo_rows])
-        ),
+        taken_photo_count=taken_photo_count,
     )
 
 

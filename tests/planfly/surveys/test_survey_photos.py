@@ -11,11 +11,19 @@ import numpy as np
 import pytest
 
 import planfly
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Camera, Command, Mission, SurveyPlan
 from flight.mission.surveys import PhotoLine, camera_notes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, _count_photos, count_flight_photos
+from logs.verdict.measures.photo_lines import (
+    LineMeasure,
+    OverlapMeasure,
+    _count_photos,
+    count_flight_photos,
+    measure_line,
+)
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Place
@@ -226,6 +234,26 @@ def test_a_line_misses_the_photos_for_which_its_camera_is_too_slow(spacing: floa
     line = PhotoLine(0, 1, 0, 1, 10.0)
     steps = np.ones(1000, dtype=np.bool_)
     assert _count_photos(line, steps, 1000.0, np.full(1000, spacing)) == (101, missed)
+
+
+def test_the_missed_photos_and_those_on_the_line_add_up_to_the_planned_ones() -> None:
+    """PX4 switches the camera 60 m before each end: photos at -60 m + 29.25 m k, up to 580 m, k from 3 to 21.
+
+    22 are planned on 640 m, 19 are taken.  With a radius of 100 m they are taken up to 540 m, k from 4 to 21.
+    """
+    lines = [wp(0, -900)]
+    for k, (south, north) in enumerate(((0, 640), (640, 0), (0, 640))):
+        lines += [wp(400 * k, south), "2 206 29.25 0 1 0 0 0 0", wp(400 * k, north), "2 206 0 0 1 0 0 0 0"]
+    for radius, taken, missed in ((60, 19, 3), (100, 18, 4)):
+        px4 = Px4(Px4Parameters.from_text(f"NAV_ACC_RAD {radius}", "a.params"))
+        setup = replace(setup_of(*lines, wp(800, 1500)), autopilot=px4)
+        requirements, [survey] = route_requirements(setup), judged_surveys(setup)
+        aligned = align_track(requirements, fly_path(setup))
+        assert aligned is not None
+        measure = measure_line(requirements, aligned, survey, survey.lines[0])
+        assert measure is not None
+        counts = (measure.planned_photo_count, measure.taken_photo_count, measure.missed_photo_count)
+        assert counts == (22, taken, missed)
 
 
 def test_the_photos_on_the_lines_are_those_taken_there() -> None:
