@@ -233,7 +233,7 @@ class Scenario:
         ]
         small_threat_notes = []
         if small_radii:
-            others = f" (and {len(small_radii) - 1} more)" if len(small_radii) > 1 else ""
+            others = f" (and {count_text(len(small_radii) - 1, 'more threat')})" if len(small_radii) > 1 else ""
             small_threat_notes = [f"{small_radii[0]}{others}: radii are in metres, not kilometres"]
         notes = [*(self.spec.zone_notes or ()), *small_threat_notes]
         timed_tables = [table for table in self.spec.zones or () if table.times]

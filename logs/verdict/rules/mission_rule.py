@@ -53,6 +53,7 @@ from logs.verdict.tolerances import (
 from world.airfield import STEEPEST_STRIP_SLOPE
 from world.errors import FlightError
 from world.frames import GeoOrigin, to_map
+from world.wording import count_text
 
 C = Command
 
@@ -75,7 +76,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkDistanceToFirstWaypoint", _check_first_distance(mission, origin)),
         ("checkDistancesBetweenWaypoints", _check_distances(mission, origin)),
         ("checkIfBelowHomeAltitude", _check_home_altitude(mission)),
-        ("checkGeofence", _check_fence(setup)),
+        ("checkMissionAgainstGeofence", _check_fence(setup)),
     )
     findings = []
     for name, check_remarks in checks:
@@ -95,7 +96,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         results.sort(key=lambda result: {False: 0, None: 1, True: 2}[result[0]])
         ok, item, reason = results[0] if results else (True, None, "no objections")
         fault = reason if isinstance(reason, Message) else message(reason)
-        more_text = f" (and {len(results) - 1} more)" if len(results) > 1 else ""
+        more_text = f" (and {count_text(len(results) - 1, 'more remark')})" if len(results) > 1 else ""
         findings.append(
             make_finding(
                 "mission",
@@ -115,7 +116,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     ]
     if refused_items and dialect == "ardupilot":
         function = "mavlink_int_to_mission_cmd"
-        more_text = f" (and {len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
+        more_text = f" (and {count_text(len(refused_items) - 1, 'more item')})" if len(refused_items) > 1 else ""
         command_text = f"ArduPlane does not support {command_name(refused_items[0].command)}"
         fault = message(command_text, f"{more_text}; PX4 accepts it")
         findings.append(
@@ -167,7 +168,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
         reason = f"no tangent joins its circle to the circle of item {first_stop.circle}"
     else:
         reason = f"lies inside the circle of item {first_stop.circle}"
-    more_text = f" (and {len(other_stops)} more)" if other_stops else ""
+    more_text = f" (and {count_text(len(other_stops), 'more item')})" if other_stops else ""
     fault = message(
         reason,
         f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, on a path that is not judged"
@@ -213,7 +214,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     if not unreached:
         return []
     is_waiting_end, first = end.command in _WAITING_ENDS, unreached[0]
-    more_text = f" (and {len(unreached) - 1} more)" if len(unreached) > 1 else ""
+    more_text = f" (and {count_text(len(unreached) - 1, 'more item')})" if len(unreached) > 1 else ""
     end_text = f": {command_name(end.command)} (item {end.seq}) ends the mission"
     end_text += " until someone sets the next item" if is_waiting_end else ""
     item_text = f"item {first.seq}: " if is_waiting_end else ""
@@ -545,23 +546,28 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
-    """Yield a remark on each route point that violates the mission's own fence by PX4's test.
+    """Yield a remark on each item whose position violates the mission's own fence by PX4's test.
+
+    PX4 tests the positions of all items, but not the path between them or a loiter's circle: the fence rule judges the
+    path.  An item that the route does not reach matters only to PX4.
 
     Without a fence, the only remark states this.  There are no remarks if the autopilot requires only that the aircraft
     is inside any one of several inclusion zones.  The fence rule then judges the flight by the union of these zones.
     """
-    if not setup.mission.fences:
+    mission, checks, origin = setup.mission, setup.autopilot.checks, setup.scenario.origin
+    if not mission.fences:
         yield True, None, "the mission has no geofence"
         return
-    if setup.autopilot.checks.any_inclusion_suffices:
+    if checks.any_inclusion_suffices:
         return
-    origin, route = setup.scenario.origin, setup.route
-    for point, item in zip(route.positions, route.items, strict=True):
-        problem = fence_problem(setup.mission.fences, origin, float(point[0]), float(point[1]))
+    route_items = set(setup.route.items.tolist())
+    for item in _flown_items(mission):
+        east, north = map(float, to_map(origin, item.lat_deg, item.lon_deg))
+        problem = fence_problem(mission.fences, origin, east, north)
         if problem is not None:
             violation, fence_item = problem
             reason = message(f"geofence violation: {violation}", f" (fence item {fence_item})")
-            yield False, int(item) if item >= 0 else None, reason
+            yield False if item.seq in route_items else REFUSED, item.seq, reason
 
 
 RULE = Rule(

@@ -198,7 +198,7 @@ def test_a_threat_of_an_array_has_its_number_as_its_name() -> None:
 
 def test_a_radius_that_is_perhaps_in_km_is_noted(caplog: pytest.LogCaptureFixture) -> None:
     scenario = planfly.make_scenario("tight", threats=[[900.0, 90.0, 0.9, 2.0], [900.0, 90.0, 10.0, 0.0]])
-    note = "the kill radius of threat 1 is 0.9 m (and 1 more): radii are in metres, not kilometres"
+    note = "the kill radius of threat 1 is 0.9 m (and 1 more threat): radii are in metres, not kilometres"
     assert scenario.notes == (note,)
     assert caplog.messages == [f"tight: {note}"]
     assert load_scenario("tight").notes == ()

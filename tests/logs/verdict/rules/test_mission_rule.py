@@ -244,10 +244,31 @@ def test_geofence() -> None:
         (fence(5002, 3, (-100, 1400), (100, 1400), (0, 1700)), "inside an exclusion polygon"),
     ):
         fenced = replace(setup, mission=replace(setup.mission, fences=fences))
-        (finding,) = [item for item in judge_geometry(fenced).findings if item.check == "checkGeofence"]
+        (finding,) = [item for item in judge_geometry(fenced).findings if item.check == "checkMissionAgainstGeofence"]
         assert finding.ok == (words is None)
-        assert "(see PX4's function checkGeofence)" in finding.reason
+        assert "(see PX4's function checkMissionAgainstGeofence)" in finding.reason
         assert words is None or words in finding.reason
+
+
+def test_a_loiter_whose_circle_alone_leaves_the_fence_is_accepted_but_breaks_the_fence() -> None:
+    """The circle of 200 m around east 1500 m reaches 1700 m, 50 m beyond the fence; PX4's upload tests its center."""
+    setup = setup_of(*GOOD, wp(1500, 900, command=19, p="20 0 200 0"))
+    fence = _fence(5001, 4, (-500, -500), (1650, -500), (1650, 2500), (-500, 2500))
+    verdict = judge_geometry(replace(setup, mission=replace(setup.mission, fences=fence)))
+    by_check = {finding.check: finding for finding in verdict.findings if finding.rule == "mission"}
+    assert by_check["checkMissionAgainstGeofence"].ok
+    failed = [finding for finding in verdict.findings if finding.ok is False]
+    assert {finding.rule for finding in failed} == {"fence"}
+
+
+def test_px4_tests_the_positions_of_items_that_the_route_does_not_reach() -> None:
+    """A waypoint after the RTL, 2.5 km outside a fence of 2.5 km, is no fault of a flight that PX4 does not refuse."""
+    setup = setup_of(*GOOD, "3 20 0 0 0 0 0 0 0", wp(0, 5000))
+    fenced = replace(setup, mission=replace(setup.mission, fences=_fence(5003, 2500, (0, 0))))
+    for autopilot, ok in ((setup.autopilot, None), (Px4(Px4Parameters.defaults()), False)):
+        findings = judge_geometry(replace(fenced, autopilot=autopilot)).findings
+        (finding,) = [item for item in findings if item.check == "checkMissionAgainstGeofence"]
+        assert (finding.ok, finding.place.item) == (ok, 5)
 
 
 def _fence(command: int, p1: float, *places: tuple[float, float]) -> tuple[MissionItem, ...]:
