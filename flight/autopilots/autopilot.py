@@ -64,7 +64,9 @@ _SOURCE_NAMES: dict[Origin, str] = {
 
 
 def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return a text for each pair of values in the wrong order, if the user's file states at least one of them.
+    """Return a text for each pair of parameters whose values are in the wrong order.
+
+    Only pairs of which the user's file states at least one parameter are checked.
 
     orders: groups of parameter names, each in the order of the values: ("THR_MIN", "TRIM_THROTTLE") says that THR_MIN
         must not exceed TRIM_THROTTLE.

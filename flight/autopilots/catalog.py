@@ -130,7 +130,9 @@ def find_program_class(program: Path) -> "type[ProgramAutopilot]":
 def autopilot_from_log(
     program: str, parameters: Mapping[str, float], source: str
 ) -> "tuple[Autopilot, tuple[str, ...]] | None":
-    """Return the autopilot that wrote a flight log, and notes on its parameters; None for an unknown program.
+    """Return the autopilot that wrote a flight log, and notes on its parameters.
+
+    The autopilot of an unknown program is None.
 
     The notes name the parameters that could not be used.
 

@@ -1,4 +1,4 @@
-"""Find the release of an autopilot in the comments of a parameter file, and choose the release to simulate."""
+"""Find an autopilot's release in the comments of a parameter file, and choose the simulated release."""
 
 import re
 from collections.abc import Sequence

@@ -249,7 +249,9 @@ class ParameterSet:
 
     @classmethod
     def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Remove parameters that the release lacks; return the sources and the names removed from the user's file.
+        """Remove parameters that the release lacks.
+
+        Return the sources, and the names removed from the user's file.
 
         In this base class the release lacks no parameter, so all sources and no names are returned.
         """

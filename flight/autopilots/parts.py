@@ -1,4 +1,6 @@
-"""Define the parts of which an autopilot is composed; the defaults of a part describe an autopilot without it.
+"""Define the parts of which an autopilot is composed.
+
+The defaults of a part describe an autopilot without that part.
 
 An autopilot returns its parts from the properties of `flight.autopilots.autopilot.Autopilot`. A part contains values
 and functions; an autopilot states only the fields that differ from the defaults: `TurnRules(acceptance_radius=90.0)`.
@@ -119,7 +121,7 @@ class SpeedLimits(NamedTuple):
 
 
 class RateLimit(NamedTuple):
-    """Largest climb or sink rate that an autopilot demands, m/s, and the parameter that sets it; "" for none."""
+    """Largest climb or sink rate that an autopilot demands, m/s, and its parameter; "" for no parameter."""
 
     rate: float = math.inf
     name: str = ""
@@ -141,7 +143,9 @@ _NO_RATE_LIMIT = RateLimit()
 
 @dataclass(frozen=True)
 class SpeedRules:
-    """Rules by which an autopilot flies commanded airspeeds; by default they are true airspeeds without limits.
+    """Rules by which an autopilot flies commanded airspeeds.
+
+    By default commanded airspeeds are true airspeeds without limits.
 
     limits: limits of the airspeeds that the autopilot accepts from a mission, or None.
     equivalent: True if commanded airspeeds are equivalent airspeeds, which at altitude are lower than true airspeeds.
@@ -329,7 +333,9 @@ NO_TRIALS = ReturnTrials()
 
 @dataclass(frozen=True)
 class ReturnBehaviour:
-    """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
+    """Behaviour of an autopilot in an RTL.
+
+    The defaults are ArduPlane's behaviour with its default parameters.
 
     rules: rules of the RTL's target, altitude, turn and loiter.
     make_parameters: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
@@ -388,7 +394,9 @@ def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> 
 
 @dataclass(frozen=True)
 class GroundRules:
-    """Rules of take-off, landing and go-around; by default the autopilot flies neither take-off nor landing.
+    """Rules of take-off, landing and go-around.
+
+    By default the autopilot flies neither a take-off nor a landing.
 
     control_law: returns the control law that also flies a take-off and a landing; None for an autopilot that flies
         neither. The arguments are the take-off and landing, the aircraft, and its contact points.

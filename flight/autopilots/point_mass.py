@@ -131,7 +131,7 @@ _CACHE_VERSION = 2
 
 @functools.lru_cache(maxsize=8)
 def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float, bool]:
-    """Return the tables of a point mass from the aircraft's trims, which are cached in the user's cache folder.
+    """Return a point mass's tables from the aircraft's trims, which are cached in the user's cache folder.
 
     The five results are: airspeeds of the grid, m/s, (v,); specific excess power, m/s, (t, v, h) for t throttles and h
     altitudes; angle of attack without lift, rad; angle of attack from lift, times the square of airspeed, rad m^2/s^2;

@@ -15,7 +15,10 @@ from flight.simulation.simulate import RunningFlight
 
 
 class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):
-    """Flight of an external program in lockstep with planfly's physics; a context manager that ends the program."""
+    """Flight of an external program in lockstep with planfly's physics.
+
+    It is a context manager that ends the program.
+    """
 
     @abstractmethod
     def prepare(self) -> None:

@@ -29,7 +29,10 @@ _MAX_D_RATIO_S = 0.25
 
 
 class RateGains(NamedTuple):
-    """Gains of a rate controller: feed-forward and P in output per rate, I in output per angle, D per acceleration."""
+    """Gains of a rate controller.
+
+    Feed-forward and P are in output per rate, I in output per angle, D in output per angular acceleration.
+    """
 
     feed_forward: float
     p: float
@@ -38,7 +41,9 @@ class RateGains(NamedTuple):
 
 
 def judge_rate_gains(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
-    """Judge the gains of a rate controller: "too low" or "too high" to control the attitude, or "" if usable.
+    """Judge if the gains of a rate controller can control the attitude.
+
+    The answer is "too low", "too high", or "" for usable gains.
 
     feed_forward_range: lowest and highest feed-forward gain that suits the aircraft; both are positive.
     time_constant: time constant of the attitude, s.

@@ -1,4 +1,7 @@
-"""Implement the steps of a simulated RTL that are the same for every autopilot: its start, clearances and loiter."""
+"""Implement the steps of a simulated RTL that all autopilots share.
+
+These are its start, its clearances and its loiter.
+"""
 
 import math
 
@@ -84,7 +87,7 @@ def initialise_state(start: Record, aircraft: Record, field: Floats, state: Reco
 
 @inner
 def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
-    """Return the throttle (0..1) at which the aircraft holds the climb rate of an RTL's start, in steps of 0.01.
+    """Return the throttle (0..1) that holds the climb rate of an RTL's start, in steps of 0.01.
 
     start: position and velocity of the start, a `RETURN_START` record.
     state: `STATE` record with the airspeed.

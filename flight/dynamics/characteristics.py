@@ -160,7 +160,7 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 
 
 def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
-    """Return the response to each control moved on its own, from level flight at cruise and without guidance.
+    """Return the response to each control moved on its own, from level cruise and without guidance.
 
     Each control moves by a tenth of its travel, because some models have actuators with play, in which a smaller
     movement would be lost. The elevator (up) and the throttle (down if it cannot be opened that much further) stay

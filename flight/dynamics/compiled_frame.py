@@ -1,4 +1,6 @@
-"""Step a flight as JSBSim does, to the last bit: motion, gravity, atmosphere, wind, aerodynamics and forces.
+"""Step a flight as JSBSim does, to the last bit.
+
+A step computes motion, gravity, atmosphere, wind, aerodynamics and forces.
 
 A step has JSBSim's order (FGFDMExec): Propagate, Inertial, Atmosphere, Winds, FCS, Auxiliary, Aerodynamics,
 GroundReactions, ExternalReactions, Aircraft, Accelerations. Propagate integrates the accelerations of the previous

@@ -40,7 +40,7 @@ _TABLE_NAMES = (*TABLES, *POWERS)
 
 
 def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelope:
-    """Return the aircraft's envelope from the cache; if it is not there, compute it and store it in the cache.
+    """Return the aircraft's envelope from the cache; compute and cache it first if necessary.
 
     The cached and the computed envelope are identical. A cache file is replaced if it is unreadable or damaged, or if
     it is for another model, JSBSim or schema. It is not replaced if its folder is not writable. The uncertainty in the

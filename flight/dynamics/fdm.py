@@ -370,7 +370,7 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Release the aircraft in any state, without a trim, for example at rest on the ground or at a hand launch.
+        """Release the aircraft in any state without a trim, such as at rest on the ground or at a hand launch.
 
         position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.

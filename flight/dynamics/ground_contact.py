@@ -1,4 +1,6 @@
-"""Compute the forces of ground contact as JSBSim does: springs, dampers, and friction by projected Gauss-Seidel.
+"""Compute the forces of ground contact as JSBSim does.
+
+They come from springs, dampers, and friction by projected Gauss-Seidel.
 
 The ground is level at the altitude of the frame's terrain (FGDefaultGroundCallback). Contacts are points of the
 structure, or wheels that neither steer nor brake (FGLGear). Friction is solved for all contacts together so that it
@@ -77,7 +79,7 @@ _DEGREES = 180.0 / math.pi
 
 @inner
 def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tuple[Vector, Vector, int]:
-    """Return the total force (lbf) and moment (lbf ft) of all contacts, and the number of friction records.
+    """Return total force (lbf) and moment (lbf ft) of all contacts, and the number of friction records.
 
     Force and moment are in body axes. They exclude friction, which `friction_accelerations` computes from the friction
     records. These records are filled here for the contacts below the ground.
@@ -124,7 +126,9 @@ def _contact_force(
     contact_index: int,
     friction_count: int,
 ) -> tuple[Vector, Vector, int]:
-    """Return the force (lbf) and moment (lbf ft) of a contact below the ground, and the number of friction records.
+    """Return force (lbf) and moment (lbf ft) of a contact below the ground.
+
+    Also return the number of friction records.
 
     Force and moment are in body axes, and exclude friction. The compression and its rate are stored in `contact`. The
     rate is limited to one that compresses the strut from nothing within a time step.
@@ -328,7 +332,7 @@ def friction_accelerations(
 
 @inner
 def _solve_frictions(contacts: Records, frictions: Records, count: int) -> None:
-    """Solve for the friction force of each contact by the Gauss-Seidel method, within the limits of the force.
+    """Solve for the friction force of each contact by the Gauss-Seidel method, within the force limits.
 
     contacts: `CONTACT` records, which hold the forces (lbf): the solution of the last step is the first guess.
     frictions: `FRICTION` records with the rows of the normalised system and the limits of the force.

@@ -1,4 +1,6 @@
-"""Interpret the instructions of a compiled model: arithmetic, tables and actuators on numbered registers.
+"""Interpret the instructions of a compiled model on numbered registers.
+
+The instructions are arithmetic, tables and actuators.
 
 An instruction is four or more unsigned numbers in a row: operation, target register, number of operands, and the
 operands, which are registers. Every operation rounds like JSBSim's function of the same name.

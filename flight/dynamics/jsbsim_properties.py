@@ -1,4 +1,4 @@
-"""Access the JSBSim properties that all models have, and convert JSBSim's units, feet, slugs and pounds."""
+"""Access the JSBSim properties that all models have, and convert JSBSim's feet, slugs and pounds."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -99,7 +99,7 @@ class ActuatorBlock(NamedTuple):
 
 
 class ExternalForce(NamedTuple):
-    """External force or moment: its name, the register of its magnitude, and the first register of its axes."""
+    """External force or moment: its name, the register of its magnitude, and the first one of its axes."""
 
     name: str
     is_moment: bool

@@ -1,4 +1,6 @@
-"""Find steady straight flights, with controls and attitude without acceleration, and the linear dynamics about them.
+"""Find steady straight flights, and the linear dynamics about them.
+
+A steady flight has controls and an attitude without acceleration.
 
 A trim has eight quantities, `QUANTITIES`. Two of them are fixed, and Newton's method finds the other six such that the
 six body accelerations vanish. Speeds and angles are relative to the air mass.
@@ -186,7 +188,10 @@ class Simulator(Protocol):
         """Move the point of evaluation to an altitude, m."""
 
     def apply_trim(self, values: Floats) -> Floats:
-        """Set the state that a trim vector (8,) describes; return its body accelerations (6,), m/s^2 and rad/s^2."""
+        """Set the state that a trim vector (8,) describes.
+
+        Return its body accelerations (6,), m/s^2 and rad/s^2.
+        """
 
     def surface_limits(self) -> tuple[float, float, float]:
         """Return the elevator, aileron and rudder limits in either direction, rad."""
@@ -354,7 +359,7 @@ def slowest_level_flight(simulator: Simulator, amsl: float, initial_trim: Trim |
 
 
 def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
-    """Return the matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
+    """Return matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
 
     simulator: JSBSim instance with the aircraft.
     trim_point: the trim.
@@ -378,7 +383,10 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     commands = np.array(trim_point.commands())
 
     def difference_quotient(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
-        """Return the central difference quotient of a rate for one element of a vector, over +-1e-4 (SI units)."""
+        """Return the central difference quotient of a rate for one element of a vector.
+
+        The element is varied by +-1e-4 in SI units.
+        """
         lower, upper = vector.copy(), vector.copy()
         lower[index] -= 1e-4
         upper[index] += 1e-4

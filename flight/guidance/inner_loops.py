@@ -1,4 +1,7 @@
-"""Implement the inner loops of roll, pitch and yaw rate that all control laws share, and the state of the guidance."""
+"""Implement the inner loops of roll, pitch and yaw rate, and the state of the guidance.
+
+All control laws share these loops.
+"""
 
 import math
 
@@ -99,7 +102,9 @@ def steer_elevator(
 def step_roll_model(
     bank_demand: float, bank: float, roll_rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the roll model by one tick; return its bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
+    """Advance the roll model by one tick.
+
+    Return its bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
 
     The model is a critically damped oscillator with limits of roll rate and roll acceleration.
 

@@ -83,7 +83,7 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 def l1_angles(
     motion: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
 ) -> tuple[float, float]:
-    """Return the angle of the ground velocity to the leg, and the angle between the leg and the L1 point, rad.
+    """Return two angles, rad: ground velocity to leg, and leg to L1 point.
 
     The L1 point is the point of the leg at the L1 distance from the aircraft, at which L1 aims. Far before the leg's
     start and past the leg's end, L1 aims straight at the waypoint there: the first angle is then measured from the

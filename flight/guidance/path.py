@@ -1,4 +1,6 @@
-"""Compute the fly-by path of a fixed-wing aircraft: legs joined by fly-by arcs, and slopes joined by parabolas.
+"""Compute the fly-by path of a fixed-wing aircraft.
+
+Fly-by arcs join its legs, and parabolas join its slopes.
 
 A fly-by arc has the bank-limited radius for the highest ground speed in the turn, and the corners of a loiter have the
 loiter's radius. If the legs are too short for their turns, the arcs are tighter than the bank limit so that the path
@@ -87,7 +89,9 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 @inner
 def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
-    """Find the aircraft's position along the path, store it in ``memory``, and return the path's course there, rad.
+    """Find the aircraft's position along the path, store it in ``memory``, and return the course there.
+
+    The course is that of the path, rad.
 
     The search starts at the piece of the last tick and never goes back.
 

@@ -1,4 +1,7 @@
-"""Control arming, modes and start of the vehicle by ground stations, as a state machine without a clock."""
+"""Control arming, modes and start of the vehicle by ground stations.
+
+This is a state machine without a clock.
+"""
 
 from dataclasses import dataclass
 

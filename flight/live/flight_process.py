@@ -440,7 +440,9 @@ class _LoggedFlight:
         self._unwritten_rows.clear()
 
     def _start_route(self, request: DivertFlight, end_reason: str) -> bool:
-        """Start another route at the aircraft's position, with its own log; return False if no such route exists.
+        """Start another route at the aircraft's position, with its own log.
+
+        Return False if the route does not exist.
 
         In that case the flight stays on its route, and an event reports the reason.
 

@@ -399,7 +399,10 @@ class Link:
     def __init__(
         self, access: Access, clock: Callable[[], float] | None = None, wall: Callable[[], float] = time.time
     ) -> None:
-        """Open the socket. Raises FlightError if the access is not protected, or if the socket cannot be bound."""
+        """Open the socket.
+
+        Raises FlightError if the access is not protected, or if the socket cannot be bound.
+        """
         check_access(access)
         self.access = access
         self.peers: dict[Address, Peer] = {}

@@ -1,4 +1,6 @@
-"""Implement the vehicle's side of the MAVLink mission protocol, as a state machine without socket and clock.
+"""Implement the vehicle's side of the MAVLink mission protocol.
+
+This is a state machine without a socket and without a clock.
 
 A mission, a fence and rally points are each accepted whole or not at all: an upload is collected next to the current
 list and replaces it only when its last item has arrived and every item is valid. One station uploads at a time;

@@ -1,4 +1,7 @@
-"""Answer a station's requests other than missions: commands, modes, parameters, messages and their rates."""
+"""Answer a station's requests: commands, modes, parameters, messages and their rates.
+
+Missions are answered by `flight.live.mission_server`.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Mapping

@@ -99,7 +99,7 @@ class SnapshotMaker:
         self._map = local_map
 
     def start_snapshot(self, setup: FlightSetup) -> Snapshot:
-        """Return the snapshot of an aircraft that stands still at the route's start, on the course of its first leg."""
+        """Return the snapshot of an aircraft at rest at the route's start, on the course of its first leg."""
         points = setup.route.positions
         first_leg = points[1] - points[0]
         terrain = setup.scenario.terrain
@@ -112,7 +112,7 @@ class SnapshotMaker:
         return self.snapshot(row)
 
     def snapshot(self, row: Record) -> Snapshot:
-        """Return the snapshot of one row of the flight's track, a record of `flight.simulation.track.TRACK_ROW`."""
+        """Return the snapshot of one row of the track, a record of `flight.simulation.track.TRACK_ROW`."""
         east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course plus the convergence.

@@ -231,7 +231,7 @@ class MissionProgress:
         return () if self._arming.last_verdict is None else self._arming.last_verdict.items
 
     def _station_number(self, waypoint: int) -> int:
-        """Return the number that stations use for the item at a waypoint, or at the next waypoint with an item.
+        """Return the number that stations use for a waypoint's item, or for the next waypoint with an item.
 
         After the last item the result is the number of that item; it is 0 without any item.
         """

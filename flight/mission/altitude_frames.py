@@ -1,4 +1,6 @@
-"""Find items whose altitude fits the terrain only in another frame: above mean sea level, or above home.
+"""Find items whose altitude fits the terrain only in another frame.
+
+The frames are above mean sea level and above home.
 
 The altitude frame of an item is one number in a mission file (0 above mean sea level, 3 above home), and a wrong one
 moves the item by the altitude of home. The number of the item then still looks right in a ground station's list.

@@ -1,4 +1,6 @@
-"""Move, raise, insert and delete items of a mission, and change speeds; each function returns a new mission.
+"""Move, raise, insert and delete items of a mission, and change speeds.
+
+Each function returns a new mission.
 
 An item keeps its frame and all values that were not edited, so that an unedited mission equals the opened one.
 Items are identified by their index in the list; item numbers and jump targets are adapted to insertions.
@@ -57,7 +59,9 @@ def movable_item(mission: Mission, index: int) -> MissionItem:
 
 
 def move_item(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Mission:
-    """Return the mission with an item moved to a latitude and longitude (degrees), at the same altitude in its frame.
+    """Return the mission with an item moved to a latitude and longitude (deg).
+
+    The item keeps its altitude in its frame.
 
     >>> items = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> move_item(Mission(None, items), 1, 46.01, 8.00000004).items[1].lon_deg
@@ -117,7 +121,7 @@ def set_loiter_radius(mission: Mission, index: int, radius: float) -> Mission:
 
 
 def insertion_index(mission: Mission, previous_index: int) -> int:
-    """Return the index at which to insert a waypoint after an item and the commands that belong to that item.
+    """Return the index at which to insert a waypoint after an item and the item's own commands.
 
     >>> items = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> insertion_index(Mission(None, tuple(items)), 0)
@@ -241,7 +245,7 @@ def _check_item(mission: Mission, item: MissionItem) -> None:
 
 
 def _renumber(item: MissionItem, after_seq: int, shift: int) -> MissionItem:
-    """Return an item with ``shift`` added to its number and to its jump target, each only if above ``after_seq``."""
+    """Return an item with ``shift`` added to its number and its jump target, if they exceed ``after_seq``."""
     params = item.params
     if item.command == Command.DO_JUMP and params[0] > after_seq:
         params = (params[0] + shift, *params[1:])

@@ -200,7 +200,10 @@ def _find_take_off(
 
 
 def climb_pitch(item: MissionItem) -> float:
-    """Return the minimum climb pitch of a take-off item, rad; `DEFAULT_CLIMB_PITCH` if the item states none."""
+    """Return the minimum climb pitch of a take-off item, rad.
+
+    It is `DEFAULT_CLIMB_PITCH` if the item states none.
+    """
     pitch = item.params[0]
     return math.radians(pitch) if pitch > 0.0 else DEFAULT_CLIMB_PITCH
 

@@ -190,7 +190,9 @@ NO_ITEM = -1
 
 @dataclass(frozen=True, slots=True)
 class RoutePoint:
-    """A stop of a mission's itinerary, or a waypoint of its route: a loiter stop becomes several waypoints.
+    """Stop of a mission's itinerary, or waypoint of its route.
+
+    A loiter stop becomes several waypoints.
 
     The position is None until `flight.mission.placing` has placed the stop on the map.
 
@@ -230,7 +232,7 @@ class RoutePoint:
     arc_radius: float = 0.0
 
     def placed_at(self, position: Position, arc_radius: float = 0.0) -> "RoutePoint":
-        """Return a copy at a position on the map (east, north, up, m), with a turn radius, m, negative to the left."""
+        """Return a copy at a map position (east, north, up, m), with a turn radius, m, negative to the left."""
         return replace(self, position=position, arc_radius=arc_radius)
 
     @property
@@ -662,7 +664,7 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:
-        """Record a command that is not simulated: as an open item if it may change the path, or only as a note.
+        """Record a command that is not simulated: an open item if it may change the path, otherwise a note.
 
         An open item leaves the verdict on the mission unresolved (see `add_open_item`). Markers and camera switches get
         neither.

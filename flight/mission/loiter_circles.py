@@ -178,7 +178,7 @@ def _make_nodes(
     rules: LoiterRules,
     unjoined: list[UnjoinedStop],
 ) -> list[RoutePoint]:
-    """Return the points and loiter circles of a route in flying order, each joined to the next by a tangent.
+    """Return a route's points and loiter circles in flying order, each joined to the next by a tangent.
 
     unjoined: receives the stops that are not at their stated positions in the result.
 
@@ -246,7 +246,9 @@ def _signed_radius(
     default_radius: DefaultRadius,
     rules: LoiterRules,
 ) -> float:
-    """Return the radius of a loiter, m, negative to the left; add a note if it differs from the stated radius.
+    """Return the radius of a loiter, m, negative to the left.
+
+    A note is added if it differs from the stated radius.
 
     loiter: loiter of the stop.
     up: altitude of the loiter, m AMSL.

@@ -1,4 +1,4 @@
-"""Place a mission's stops on the map, and build a scenario around a mission file that came without one."""
+"""Place a mission's stops on the map, and build a scenario around a mission file without one."""
 
 import math
 import re
@@ -300,14 +300,14 @@ def _is_navigation_target(item: MissionItem) -> bool:
 
 
 def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> tuple[float, float, float]:
-    """Return an item's position on the map (east, north, up AMSL, m), at home's altitude if it states none."""
+    """Return an item's map position (east, north, up AMSL, m), at home's altitude if it states none."""
     stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = project_stops(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.stop_altitude(stop, east, north, heights.home_amsl())
 
 
 def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> LandingStart:
-    """Return a stop of a landing sequence: its position, its loiter if it is one, and the altitude of home.
+    """Return a stop of a landing sequence: its position, its loiter if any, and the altitude of home.
 
     The field ``next_stops`` is empty, and the distance to the sequence is measured to the item's position.
     """
@@ -382,7 +382,9 @@ def _place_return_points(
 def _place_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_AltitudeConverter", vertical_legs: bool
 ) -> list[RoutePoint]:
-    """Return the stops of an itinerary on the map; successive stops at the same position are merged into one.
+    """Return an itinerary's stops on the map.
+
+    Successive stops at the same position are merged into one.
 
     heights: converter that also receives the notes.
     vertical_legs: True to accept a position straight above or below the previous one; see `place_stops`.

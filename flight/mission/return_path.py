@@ -263,7 +263,7 @@ def choose_target(
 
 
 def rally_target(rules: ReturnRules, start: Position, point: ReturnPoint) -> ReturnTarget:
-    """Return a rally point as the destination of an RTL from a start, even if the autopilot would choose another.
+    """Return a rally point as the destination of an RTL, even if the autopilot would choose another.
 
     >>> rules = ReturnRules(holds_height=True, transit_height=300.0, rally_height=100.0)
     >>> target = rally_target(rules, (0.0, 0.0, 700.0), ReturnPoint(1000.0, 0.0, 500.0))

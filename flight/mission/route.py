@@ -1,4 +1,4 @@
-"""Lay out the route of a mission as the aircraft flies it, with waypoints, airspeeds and unrolled jumps."""
+"""Lay out a mission's route as the aircraft flies it: waypoints, airspeeds and unrolled jumps."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -147,7 +147,10 @@ class Route:
         object.__setattr__(self, "points", points)
 
     def with_fields(self, **fields: ArrayLike) -> "Route":
-        """Return a copy of the route with new values in some fields of its points; fields as for `route_points`."""
+        """Return a copy of the route with new values in some fields of its points.
+
+        The fields are those of `route_points`.
+        """
         points = self.points.copy()
         _set_fields(points, fields)
         return replace(self, points=points)
@@ -295,7 +298,9 @@ SHARPEST_FLY_BY_RAD = math.radians(150.0)
 def fly_over_waypoints(
     points: Records, limits: Limits | None, turn_distance: Callable[[float, float], float] | None = None
 ) -> Flags:
-    """Return a mask of the waypoints that must be flown over, because a fly-by arc would pass too far away, (w,).
+    """Return a mask of the waypoints that must be flown over, (w,).
+
+    A fly-by arc would pass too far from these waypoints.
 
     points: points of a route, (w,) of `ROUTE_POINT`.
     limits: limits of the aircraft; None if unknown, for a result of False.
@@ -408,7 +413,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
 def _lead_point(
     point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
 ) -> np.ndarray | None:
-    """Return the outer end of a level lead-in or lead-out leg at an end of a route, (3,) m; None if not needed.
+    """Return the outer end of a level lead-in or lead-out leg, (3,) m; None if not needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course at this end, rad.
@@ -445,7 +450,7 @@ def make_route(
     limits: Limits | None = None,
     rules: RouteRules = DEFAULT_ROUTE_RULES,
 ) -> Route:
-    """Return the route of a mission on the map about ``origin``: `place_stops`, then `route_through_stops`.
+    """Return a mission's route on the map about ``origin``: `place_stops`, then `route_through_stops`.
 
     terrain: None if unknown; heights above terrain are then an error.
     default_airspeed: airspeed until the mission sets one, m/s. The cruiseSpeed of a `.plan` file does not set it,
@@ -481,7 +486,9 @@ def route_through_stops(
     limits: Limits | None = None,
     rules: RouteRules = DEFAULT_ROUTE_RULES,
 ) -> Route:
-    """Return the route through the stops of a mission that are placed on the map; arguments as for `make_route`.
+    """Return the route through a mission's stops on the map.
+
+    The arguments are those of `make_route`.
 
     Raises MissionError for fewer than two stops, or for a loiter too wide or too long to lay out.
     """
@@ -554,7 +561,9 @@ def route_through_stops(
 def _find_direct_landing(
     placed_mission: PlacedMission, stops: list[RoutePoint], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence to which the mission's RTL flies without a loiter, or None; add a note on it.
+    """Return the landing sequence to which the mission's RTL flies without a loiter.
+
+    Return None if there is no such sequence. A note on the sequence is added.
 
     stops: stops before the RTL.
     """
@@ -587,7 +596,9 @@ def _find_landing(
 
 
 def _landing_choice_text(placed_mission: PlacedMission) -> str:
-    """Describe the choice of a landing sequence, " (the nearest of 2, with height differences)"; "" for a single one.
+    """Describe the choice of a landing sequence; "" for a single one.
+
+    For example " (the nearest of 2, with height differences)".
 
     ArduPlane compares distances in three dimensions.
     """
@@ -684,7 +695,9 @@ _MAX_GATE_DISTANCE_M = 10.0
 
 
 def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
-    """Return the placed stops of a mission, with a stop for each gate at which PX4 changes airspeed or camera.
+    """Return a mission's placed stops, with a stop for each gate.
+
+    At a gate PX4 changes airspeed or camera.
 
     PX4 passes a gate when the aircraft crosses the plane through the gate that is perpendicular to the line from the
     gate to the next stop. Each gate is placed where this plane cuts the leg. A gate that is not between two waypoints,

@@ -289,7 +289,7 @@ def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, or
 
 
 def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin) -> MissionItem:
-    """Return a plain waypoint at a position (east, north, m), with the altitude and number of another item."""
+    """Return a plain waypoint at a position (east, north, m), with another item's altitude and number."""
     lat, lon = (round_to_grid(float(value)) for value in to_geo(origin, float(position[0]), float(position[1])))
     params = (0.0, 0.0, 0.0, model_item.params[3] if math.isnan(model_item.params[3]) else 0.0)
     return replace(model_item, command=int(Command.NAV_WAYPOINT), params=params, lat_deg=lat, lon_deg=lon)

@@ -337,7 +337,7 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
 
 
 def _straight_runs(route: Route) -> list[tuple[int, int]]:
-    """Return the indices of the first and last waypoint of each straight run: successive legs on one course.
+    """Return the first and last waypoint index of each straight run: successive legs on one course.
 
     The legs of a take-off, a landing, a loiter and an RTL are left out.
     """

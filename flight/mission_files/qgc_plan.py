@@ -156,7 +156,7 @@ class _CameraCalc(BaseModel):
 
 
 def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warnings: list[str]) -> SurveyPlan:
-    """Return the settings that a survey stores in addition to its items: line extension, camera and height.
+    """Return the settings that a survey stores besides its items: line extension, camera and height.
 
     settings: content of the survey's TransectStyleComplexItem.
     items: simple items of the survey, which state the distance between photos.

@@ -590,7 +590,10 @@ def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
-    """Return the gear to assume for a model without ground contacts: wheels for a runway, otherwise a belly."""
+    """Return the gear to assume for a model without ground contacts.
+
+    It is wheels for a runway, otherwise a belly.
+    """
     return (
         "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
     )

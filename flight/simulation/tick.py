@@ -1,4 +1,4 @@
-"""Define the record of a flight for the compiled loop, and the parts of a tick that all autopilots share.
+"""Define a flight's record for the compiled loop, and the parts of a tick that all autopilots share.
 
 A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`);
 then an autopilot's control law fills in the commands; the tick ends with the next wind, a row of the track and the
@@ -126,7 +126,9 @@ WORKSPACE_NUMBERS = WORKSPACE.itemsize // 8
 
 
 class Workspace:
-    """Record and path of one flight in one block of memory, with views of the data that JSBSim reads and writes.
+    """Record and path of one flight in one block of memory.
+
+    It has views of the data that JSBSim reads and writes.
 
     Numba checks the type of each argument of a call, and takes twice as long for a record as for an array of numbers.
     Therefore all data is passed to compiled code as one block.
@@ -197,7 +199,7 @@ class Workspace:
         return (self._estimated - self._true).tolist()
 
     def _field_numbers(self, field: str, count: int) -> Floats:
-        """Return the first ``count`` numbers of a field of the record as an array that shares the field's memory."""
+        """Return the first ``count`` numbers of a record's field, as an array that shares its memory."""
         fields: Any = WORKSPACE.fields
         return np.frombuffer(self.array, np.float64, count, fields[field][1])
 
@@ -340,7 +342,9 @@ def end_tick(workspace: Record, block: Floats) -> None:
 
 @inner
 def airborne_end_code(workspace: Record) -> int:
-    """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
+    """Return the code of the first condition that ends an airborne flight; 0 if it continues.
+
+    The codes are the keys of `ENDS`.
 
     The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
     """
@@ -392,7 +396,9 @@ def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: floa
 
 @inner
 def update_end_loiter(motion: Record, memory: Record, dt: float) -> None:
-    """Update the course change in the loiter at a mission's end, and end the flight at `END_LOITER_ANGLE_RAD`.
+    """Update the course change in the loiter at a mission's end.
+
+    The flight ends at `END_LOITER_ANGLE_RAD`.
 
     The course is used instead of the bearing from the waypoint. An aircraft that cannot fly the loiter's radius flies
     loops next to the waypoint, and the bearing may then turn by 360 degrees in one loop or in three.

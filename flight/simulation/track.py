@@ -201,7 +201,7 @@ _STEPS_PER_UNIT = np.exp2(
 
 
 def quantise(rows: Rows) -> Rows:
-    """Return a copy of a flight's track rows, rounded to the resolution of `DIGITS` and without negative zeros.
+    """Return a copy of track rows, rounded to the resolution of `DIGITS` and without negative zeros.
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
@@ -215,7 +215,7 @@ def _as_matrix(rows: Rows) -> Floats:
 
 @compiled
 def _round_to_steps(values: Floats, steps: Floats) -> Floats:
-    """Return values (t, 1 + n) with each column except the first rounded to multiples of the column's step.
+    """Return values (t, 1 + n) with each column but the first rounded to multiples of the column's step.
 
     steps: reciprocal of the step of each rounded column, (n,), a power of two.
     """

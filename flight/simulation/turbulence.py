@@ -17,7 +17,7 @@ GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_firs
 
 @inner
 def dryden_scales(height: float) -> tuple[float, float, float]:
-    """Return the Dryden length scales L_u = L_v and L_w (m) and the ratio sigma_u / sigma_w of the gust deviations.
+    """Return Dryden's length scales L_u = L_v and L_w, m, and the ratio sigma_u / sigma_w of gusts.
 
     height: height above ground, m.
 
@@ -47,7 +47,9 @@ def start_gusts(noise: Floats, filters: Record) -> None:
 def step_gusts(
     filters: Record, noise: Floats, w20: float, height: float, airspeed: float, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the gust filters by a tick; return the gust, m/s: along the mean wind, to its right, and down.
+    """Advance the gust filters by a tick.
+
+    Return the gust, m/s: along the mean wind, to its right, and down.
 
     filters: a record of `GUST_FILTERS`.
     noise: random numbers from the standard normal distribution, (3,).

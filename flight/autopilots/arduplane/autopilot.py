@@ -164,7 +164,7 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list, because ArduPlane has a default for each parameter that the aircraft does not state.
+        """Return an empty list: ArduPlane has a default for each parameter that the aircraft does not state.
 
         Raises ParameterError if the aircraft's own parameter file is invalid.
         """
@@ -426,7 +426,7 @@ class ArduPlane(Autopilot):
 
     @property
     def deviations(self) -> Deviations:
-        """Deviations from the legs, and the altitude that ArduPlane gains in updrafts while it holds its airspeed."""
+        """Deviations from the legs, and the altitude gain in updrafts while the airspeed is held."""
         # Try values only up to the pitch at which another parameter becomes the limit.
         name, *other_names = self._max_pitch_parameters
         higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
@@ -465,7 +465,9 @@ class ArduPlane(Autopilot):
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
-    """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter.
+    """Start a new leg at ``start``, and keep the state of TECS and of the airspeed filter.
+
+    This is ArduPlane's behaviour after a change of mode.
 
     previous_record, record: records of the control law before and after the change; the internal state in the second
         is set.

@@ -1,4 +1,6 @@
-"""List the events that can end a mission of ArduPlane, and ArduPlane's reactions according to its parameters.
+"""List the events that can end a mission of ArduPlane, and ArduPlane's reaction to each.
+
+The reactions depend on ArduPlane's parameters.
 
 Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.

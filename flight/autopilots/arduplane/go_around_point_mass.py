@@ -1,4 +1,6 @@
-"""Simulate a go-around with a point mass in a few milliseconds, up to the return to the landing approach.
+"""Simulate a go-around with a point mass, up to the return to the landing approach.
+
+A simulation takes a few milliseconds.
 
 The simulation follows `AP_Landing::type_slope_verify_abort_landing`, `restart_landing_sequence` (libraries/AP_Landing)
 and `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6. The aircraft climbs
@@ -68,7 +70,7 @@ def make_abort_start(
     wind: tuple[float, float] = (0.0, 0.0),
     time: float = 0.0,
 ) -> Records:
-    """Return the start of a go-around at a position on a landing glide, as one `RETURN_START` record, (1,).
+    """Return the start of a go-around at a position on a landing glide: one `RETURN_START` record, (1,).
 
     position: east, north, up, m.
     course: course of the glide over the ground, rad.

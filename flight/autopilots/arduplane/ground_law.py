@@ -1,4 +1,4 @@
-"""Run one compiled tick of ArduPlane's take-off or landing, in a flight that begins or ends on the ground.
+"""Run one compiled tick of ArduPlane's take-off or landing.
 
 In the air the law is `flight.autopilots.arduplane.law`. Take-off and landing use the same law with other parameters
 and demands:
@@ -268,7 +268,9 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
 
 @inner
 def end_status(work: Record, ground: Record) -> int:
-    """Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
+    """Return the code of the flight's end, or 0 if the flight continues.
+
+    The codes are the keys of `flight.simulation.tick.ENDS`.
 
     work: a `flight.simulation.tick.WORKSPACE` record.
     ground: a `GROUND_STATE` record, filled by this control law or from the flight of ArduPlane's program.
@@ -401,7 +403,7 @@ def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record,
 def _set_take_off_parameters(
     estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, roll_error: float
 ) -> None:
-    """Set the control parameters of the take-off: fixed pitch, airspeed held by pitch, bank limit by height.
+    """Set the take-off's control parameters: fixed pitch, airspeed by pitch, bank limit by height.
 
     Follows `Plane::takeoff_calc_pitch`, `Plane::get_takeoff_pitch_min_cd` and `Plane::takeoff_calc_roll`.
 

@@ -1,4 +1,6 @@
-"""Compute when ArduPlane starts the motor of a launched aircraft, from acceleration, speed and attitude.
+"""Compute when ArduPlane starts the motor of a launched aircraft.
+
+ArduPlane decides by acceleration, speed and attitude.
 
 With TKOFF_THR_MINACC ArduPlane waits for an acceleration along the nose, and then for TKOFF_THR_DELAY. Within a tenth
 of a second after that the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees;

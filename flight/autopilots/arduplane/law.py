@@ -1,4 +1,4 @@
-"""Implement ArduPlane's control law as compiled code: its internal state, the altitude demand, and one tick."""
+"""Implement ArduPlane's control law as compiled code: internal state, altitude demand, and one tick."""
 
 import math
 
@@ -246,7 +246,7 @@ def _terrain_following_altitude_demand(estimated: Record, target: Record, parame
 def update_terrain_lookahead(
     work: Record, heights: Heights, waypoints: Records, parameters: Record, memory: Record
 ) -> None:  # pragma: no cover
-    """Update the ground altitude at the aircraft and the terrain lookahead, on a leg that follows the terrain.
+    """Update the ground altitude and the terrain lookahead, on a leg that follows the terrain.
 
     The lookahead is the height by which the terrain ahead exceeds what the aircraft can climb. The first update of a
     leg also stores the height above ground of the leg's start. As in `AP_Terrain::lookahead`, the terrain is sampled

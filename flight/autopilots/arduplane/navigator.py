@@ -70,7 +70,7 @@ def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_dis
 
 @inner
 def is_past_finish_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
-    """Return True if the aircraft is past the line across the end of a leg, or if the leg is shorter than 3 cm.
+    """Return True if the aircraft is past the line across the leg's end, or the leg is under 3 cm long.
 
     Follows `Location::past_interval_finish_line`.
 
@@ -93,7 +93,7 @@ def navigate_legs(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Set the lateral acceleration demand on the current leg, and begin the next leg once this leg is over.
+    """Set the lateral acceleration demand on the current leg; begin the next leg once this leg is over.
 
     A leg to a waypoint follows the line to it, a leg to a loiter also flies around the loiter, and an RTL lasts until
     it joins the landing sequence. The last leg of the route never ends here.
@@ -145,7 +145,9 @@ def navigate_legs(
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of the point to which ArduPlane flies, m: a loiter's center, or the waypoint itself.
+    """Return the position to which ArduPlane flies: east and north, m.
+
+    It is the center of a loiter, or the waypoint itself.
 
     For an RTL the waypoint itself is returned.
     """
@@ -194,7 +196,7 @@ def _follow_line(
 
 @inner
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
-    """Return L1's angle (rad), or the last angle if the new angle would reverse a turn of almost 180 degrees.
+    """Return L1's angle, or the last angle if the new one would reverse a turn of almost 180 degrees; rad.
 
     The result is stored as the last angle. Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the
     heading.
@@ -324,7 +326,9 @@ def _update_loiter(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
+    """Fly to a loiter and around it.
+
+    The loiter ends when it is complete and the aircraft heads for the next waypoint.
 
     Follows `Plane::update_loiter`: far from the circle the aircraft flies straight to its center, then around it. The
     next leg begins once the loiter is complete and the course leads to the next waypoint outside this loiter.
@@ -377,7 +381,9 @@ def _update_loiter(
 
 @inner
 def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: float) -> None:
-    """Update the time on a loiter and the angle flown around it, both since the aircraft reached the circle.
+    """Update the time on a loiter and the angle flown around it.
+
+    Both are measured from the moment when the aircraft reaches the circle.
 
     Also record whether the aircraft has reached the loiter's altitude. Follows `Plane::loiter_angle_update`.
 

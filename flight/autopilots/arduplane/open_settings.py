@@ -1,4 +1,6 @@
-"""List ArduPlane's settings that change a flight, are not simulated, and therefore leave the verdict undecided.
+"""List ArduPlane's settings that change a flight but are not simulated.
+
+These settings leave the verdict undecided.
 
 Names, defaults and effects are from ArduPlane 4.6.3 and 4.7; docs/arduplane-branches.md lists the function of each.
 Each is read from a parameter file, and has no part in the control law.

@@ -484,7 +484,9 @@ class ArduPilotParameters(ParameterSet):
 
     @classmethod
     def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Remove parameters that release 4.6 lacks; return the sources and the names removed from the user's file.
+        """Remove parameters that release 4.6 lacks.
+
+        Return the sources, and the names removed from the user's file.
 
         Release 4.6 uses fixed values instead of these parameters, which an additional source states. For any other
         release the sources are returned unchanged.
@@ -513,7 +515,9 @@ class ArduPilotParameters(ParameterSet):
 
     @property
     def resets_jump_counters(self) -> bool:
-        """True if ArduPlane resets the counter of a completed jump: in 4.7, unless bit 3 of MIS_OPTIONS is set.
+        """True if ArduPlane resets the counter of a completed jump.
+
+        ArduPlane 4.7 does, unless bit 3 of MIS_OPTIONS is set.
 
         >>> [ArduPilotParameters.defaults().changed(MIS_OPTIONS=bits).resets_jump_counters for bits in (0, 8)]
         [True, False]

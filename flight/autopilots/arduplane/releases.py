@@ -83,7 +83,9 @@ class ReleaseChoice(NamedTuple):
 
 
 def choose_release(requested_version: ArduPlaneVersion | None, params: str) -> ReleaseChoice:
-    """Return the release to simulate with a parameter file: the requested one, the file's release, or the newest.
+    """Return the release to simulate with a parameter file.
+
+    It is the requested release, or else the file's release, or else the newest release.
 
     The result has a note if parameters of the file have another name in this release.
 

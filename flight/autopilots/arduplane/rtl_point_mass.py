@@ -190,7 +190,9 @@ def _make_stages(
 
 
 def truncate_at_first_loiter(stops: Sequence[LandingStart]) -> Sequence[LandingStart]:
-    """Return the stops of a landing sequence up to its first loiter, because the exit from it is not simulated.
+    """Return the stops of a landing sequence up to its first loiter.
+
+    The exit from the loiter is not simulated.
 
     >>> stops = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), is_loiter=k == 2) for k in (1, 2, 3)]
     >>> [stop.item for stop in truncate_at_first_loiter(stops)]
@@ -201,7 +203,7 @@ def truncate_at_first_loiter(stops: Sequence[LandingStart]) -> Sequence[LandingS
 
 
 def fill_stage(stage: Record, stop: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Fill a stage's record from a stop of a landing sequence, which is a waypoint or the center of a loiter."""
+    """Fill a stage's record from a stop of a landing sequence: a waypoint, or the center of a loiter."""
     stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = stop.position
     stage.pass_by, stage.home_up = stop.pass_by, stop.home_up
     # The turn to the next leg is unknown: use a right angle, as at a mission's end.
@@ -330,7 +332,7 @@ def fly_stages(
 
 @inner
 def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
-    """Return the fractions by which roll, pitch and path angle approach their demands in one tick of ``dt`` s.
+    """Return the fractions by which roll, pitch and path angle approach their demands in one tick.
 
     parameters: ArduPlane's parameters, an `ARDUPILOT_PARAMETERS` record.
     dt: duration of a tick, s.
@@ -477,7 +479,9 @@ def _initialise_memory(
     state: Record,
     memory: Record,
 ) -> None:
-    """Set the state from the motion over the ground, and the law's internal state as after a long steady flight.
+    """Set the state from the motion over the ground.
+
+    The internal state of the control law is set as after a long steady flight.
 
     Follows `flight.autopilots.arduplane.law.initialise_memory`, which assumes level flight. In a climb or descent the
     input of the altitude demand is ahead of the aircraft by the lag of the demand.

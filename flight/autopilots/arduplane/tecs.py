@@ -65,7 +65,7 @@ def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank:
 
 @inner
 def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
-    """Return the bank (rad) for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and by the stall.
+    """Return the bank for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and by the stall; rad.
 
     The limit by the stall grows with the airspeed. It applies only with stall prevention.
 

@@ -1,4 +1,6 @@
-"""Compute ArduPlane's deviation from the legs of a plan by simulating corners with its own guidance in the plane.
+"""Compute ArduPlane's deviation from the legs of a plan.
+
+Corners are simulated in the horizontal plane with ArduPlane's own guidance.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.arduplane.law` and the lag of its
 bank, to find the acceptance radius with the least deviation. For wind, the excursion in still air at the highest

@@ -35,7 +35,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @classmethod
     def with_model(cls, model: ArduPlane, binary: Path) -> Self:
-        """Return the autopilot that runs the ArduPlane program, with the parameters of the simulated ArduPlane."""
+        """Return the autopilot that runs the ArduPlane program with the simulated ArduPlane's parameters."""
         return cls(model.parameters, binary=binary)
 
     @classmethod

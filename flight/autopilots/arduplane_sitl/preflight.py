@@ -1,4 +1,7 @@
-"""Prepare ArduPlane before a flight: read parameters, upload the mission, set home, arm, and switch to AUTO."""
+"""Prepare ArduPlane before a flight.
+
+The steps are: read parameters, upload the mission, set home, arm, and switch to AUTO.
+"""
 
 from collections.abc import Iterable
 

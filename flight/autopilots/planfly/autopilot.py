@@ -1,4 +1,4 @@
-"""Implement planfly's own guidance as an autopilot that follows the fly-by path by one of three lateral laws."""
+"""Implement planfly's own guidance, which follows the fly-by path by one of three lateral laws."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Self

@@ -1,4 +1,4 @@
-"""Compute planfly's guidance in compiled code, from the state to the four commands, on records with named fields.
+"""Compute planfly's guidance in compiled code: from the aircraft's state to the four commands.
 
 There are three lateral laws. Planfly's own is a second-order cross-track law with curvature feed-forward about the
 offset path that a rolling aircraft can follow; it counters gusts by bank, and by a skid at the bank limit. L1 flies
@@ -293,7 +293,9 @@ def _cross_track_bank_command(
 def _roll_offset_correction(
     curvature: float, gains: Record, memory: Record, turn_acceleration: float, speed: float, crab: float, dt: float
 ) -> float:
-    """Return the acceleration to the right that corrects the offset from rolling into and out of arcs, m/s^2.
+    """Return the acceleration to the right that corrects the offset from rolling at arcs, m/s^2.
+
+    The offset arises because the aircraft needs time to roll into an arc and out of it.
 
     An aircraft needs time to change its bank, so it leaves the path where the curvature changes in a step. A model of
     the roll predicts this offset (m, positive to the right), and stores it in ``memory.roll_offset``: the lateral law

@@ -557,7 +557,10 @@ class Px4(Autopilot):
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return PX4's deviations from a plan; ``fly_over`` has no effect, because PX4 turns before each waypoint."""
+        """Return PX4's deviations from a plan.
+
+        ``fly_over`` has no effect, because PX4 turns before each waypoint.
+        """
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Px4":

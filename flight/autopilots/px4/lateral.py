@@ -131,7 +131,7 @@ def adapted_period(
 def reference_air_velocity(
     bearing_east: float, bearing_north: float, wind_east: float, wind_north: float, airspeed: float
 ) -> tuple[float, float]:
-    """Return the velocity through the air, east and north, m/s, with which the aircraft flies a course in a wind.
+    """Return the velocity through the air that gives a course over ground in a wind: east and north, m/s.
 
     If the wind is too strong for the course, the ground course of the result is as close to the course as possible.
 

@@ -1,4 +1,4 @@
-"""Navigate as PX4 does: choose the waypoint to fly to, accept it, and set the altitude setpoint on a leg.
+"""Navigate as PX4 does: choose and accept waypoints, and set the altitude setpoint on a leg.
 
 Follows PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and
 `src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`). A waypoint is reached within a radius of it, or past the plane
@@ -90,7 +90,9 @@ def navigate(
     memory: Record,
     dt: float,
 ) -> None:
-    """Follow the current leg, set the altitude setpoint, and begin the next leg once the target is reached.
+    """Follow the current leg, and set the altitude setpoint.
+
+    The next leg begins once the target is reached.
 
     The target is the next waypoint, loiter or RTL. Gates before it only divide the way to it into legs.
 
@@ -293,7 +295,10 @@ def is_last_target(waypoints: Records, memory: Record) -> bool:
 
 @inner
 def _setpoint_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of a waypoint's position setpoint, m: the waypoint, or the center of its loiter."""
+    """Return the position setpoint of a waypoint: east and north, m.
+
+    It is the waypoint, or the center of its loiter.
+    """
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0

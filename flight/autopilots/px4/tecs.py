@@ -1,4 +1,6 @@
-"""Implement PX4's TECS, with throttle from the STE rate and pitch from the balance of altitude and speed (SEB rate).
+"""Implement PX4's TECS: throttle from the STE rate, and pitch from the SEB rate.
+
+The specific energy balance (SEB) weighs altitude against speed.
 
 Follows PX4's `src/lib/tecs/TECS.cpp` and its parameter reference (FW_T_*). The Total Energy Control System is by
 Lambregts (AIAA 83-2239). Energies are per kilogram, their rates m^2/s^3. Speeds are true airspeeds.

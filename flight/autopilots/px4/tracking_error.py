@@ -1,4 +1,6 @@
-"""Compute PX4's deviation from the legs of a plan by simulating horizontal turns with its own guidance.
+"""Compute PX4's deviation from the legs of a plan.
+
+Horizontal turns are simulated with PX4's own guidance.
 
 Each turn is simulated in still air, at a constant ground speed, with `flight.autopilots.px4.navigator` and the lag of
 the roll. For wind, the excursion in still air at the highest ground speed on the leg is increased by `WIND_SPREAD`.
@@ -128,7 +130,7 @@ def altitude_miss_probability(
 
 
 def _exceedance_probability(deviations: float) -> float:
-    """Return the probability that a normal variable exceeds its mean by this number of standard deviations."""
+    """Return the probability that a normal variable exceeds its mean by some standard deviations."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
 

@@ -1,4 +1,7 @@
-"""Collect PX4's parameters for a flight from the simulation, the aircraft, and, with priority, the user."""
+"""Collect PX4's parameters for a flight: from the simulation, the aircraft and the user.
+
+The user's parameters have priority.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Prepare PX4 before a flight: read parameters, upload the mission, set home, arm, and start mission mode."""
+"""Prepare PX4 before a flight.
+
+The steps are: read parameters, upload the mission, set home, arm, and start mission mode.
+"""
 
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,4 +1,6 @@
-"""Exchange MAVLink messages with a SITL autopilot before the flight, while the aircraft is held on its rail.
+"""Exchange MAVLink messages with a SITL autopilot before the flight.
+
+The aircraft is held on its rail meanwhile.
 
 Each step of the conversation is a generator. When it is resumed, the autopilot's time has advanced, and the link has
 processed the messages that arrived in between.

@@ -1,4 +1,7 @@
-"""Exchange data with an autopilot in lockstep: it sends outputs to the controls, and receives the aircraft's motion."""
+"""Exchange data with an autopilot in lockstep.
+
+The autopilot sends its outputs to the controls, and receives the aircraft's motion.
+"""
 
 import math
 import struct
@@ -291,7 +294,7 @@ class Lockstep(ABC):
         )
 
     def step(self) -> None:
-        """Run one frame of flight: step JSBSim with the present controls, and send the motion to the autopilot."""
+        """Step JSBSim by one frame with the present controls, and send the motion to the autopilot."""
         self._access.run()
         lat, lon, amsl, velocity_north, velocity_east, velocity_down, roll, pitch, yaw, p, q, r, airspeed = [
             get() * factor for get, factor in self._motion

@@ -287,7 +287,7 @@ class SitlFlight(ProgramFlight):
 
     @abstractmethod
     def _prepare_program(self) -> None:
-        """Upload and start the mission with the aircraft on the rail, and push the aircraft to the end of the rail."""
+        """Upload and start the mission on the rail, then push the aircraft to the rail's end."""
 
     def __enter__(self) -> Self:
         """Return the flight itself."""

@@ -1,4 +1,7 @@
-"""Connect to an autopilot's program by MAVLink: send messages to it, and collect the state that it reports."""
+"""Connect to an autopilot's program by MAVLink.
+
+The link sends messages, and collects the state that the program reports.
+"""
 
 import socket
 import struct

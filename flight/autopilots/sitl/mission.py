@@ -115,7 +115,9 @@ def _item_with_position(
     origin: GeoOrigin,
     earlier_items: list[MissionItem],
 ) -> MissionItem:
-    """Return a navigation item for the upload; a loiter keeps its parameters, other items become waypoints.
+    """Return a navigation item for the upload.
+
+    A loiter keeps its parameters; other items become waypoints.
 
     waypoint_indices: waypoints of the route that belong to the item.
     earlier_items: items that are uploaded before this item; a loiter without a position is placed at the last position

@@ -1,4 +1,7 @@
-"""Map an autopilot's servo outputs to the controls that they move, from the aircraft's `ardupilot.toml`."""
+"""Map an autopilot's servo outputs to the controls that they move.
+
+The map is in the aircraft's `ardupilot.toml`.
+"""
 
 import math
 from collections.abc import Sequence
@@ -137,7 +140,10 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
 
 
 def _parse_output(name: str, entry: Any) -> ServoOutput:
-    """Return the servo of the named control from its table in the file. Raises ValueError with the entry's name."""
+    """Return the servo of a control from its table in the file.
+
+    Raises ValueError with the name of the entry.
+    """
     unit = _UNITS[name]
     key = f"value_{unit}" if unit else "value"
     if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:
