@@ -1,4 +1,6 @@
-"""Encode Foxglove messages for a 3-D viewer: terrain, threats, zones, plan, track, returns and aircraft.
+"""Encode Foxglove messages for a 3-D viewer.
+
+They show terrain, threats, zones, plan, track, returns and aircraft.
 
 The frame `map` has the scenario's axes east, north and up (AMSL) in metres; `aircraft` has forward, left, up.
 """
@@ -116,7 +118,9 @@ def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> L
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Encode the ground of the area as a SceneUpdate: a coloured mesh with up to `MAX_VERTICES` vertices per side.
+    """Encode the ground of the area as a SceneUpdate: a coloured mesh.
+
+    The mesh has up to `MAX_VERTICES` vertices per side.
 
     Without terrain, or without known heights, the scene is empty.
     """
@@ -227,7 +231,9 @@ def _make_label(position: Floats, name: str) -> TextPrimitive:
 
 
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
-    """Encode the plan as a SceneUpdate: legs as a line, and waypoints as dots with their numbers and mission items.
+    """Encode the plan as a SceneUpdate: legs as a line, waypoints as dots.
+
+    The dots have the numbers of their waypoints and mission items.
 
     waypoints: (w, 3), m.
     items: number of each waypoint's mission item, negative for none, (w,).
@@ -417,7 +423,10 @@ def model_colours() -> Singles:
 
 
 def aircraft_glb() -> bytes:
-    """Encode the aircraft model as the bytes of a `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
+    """Encode the aircraft model as the bytes of a `.glb` file.
+
+    The model is one unit wide, in glTF's axes (right-handed, y up).
+    """
     pieces = b""
     views: list[dict[str, Any]] = []
     accessors, primitives, materials = [], [], []

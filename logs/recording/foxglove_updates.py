@@ -1,4 +1,7 @@
-"""Encode the moving parts of 3-D views (pose, track, events), and point clouds for viewers without meshes."""
+"""Encode the moving parts of 3-D views: pose, track and events.
+
+Point clouds are added for viewers without meshes.
+"""
 
 import math
 from collections.abc import Iterator
@@ -131,7 +134,9 @@ class FlightEvents:
         }
 
     def event_records(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
-        """Yield a message for each event in the next rows: a new leg, or an entry into or exit from a threat's range.
+        """Yield a message for each event in the next rows.
+
+        An event is a new leg, or an entry into or exit from a threat's range.
 
         Ranges are checked once every `_CHECK_INTERVAL_NS`.
 
@@ -389,7 +394,9 @@ class ViewerMessages:
         self._next_cloud = 0.0  # s
 
     def pose_records(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
-        """Yield the messages of the next rows: a transform every 0.2 s, a position fix each second, and the track.
+        """Yield the messages of the next rows: transforms, position fixes and the track.
+
+        A transform is written every 0.2 s, and a position fix each second.
 
         The track is encoded as a line every `TRACK_INTERVAL_S`, and as points at growing intervals.  Rows with
         non-finite numbers are skipped.
@@ -427,7 +434,9 @@ class ViewerMessages:
                 yield self._track_cloud_record(log_time, [*self._path[:-1], start_positions[: k + 1]])
 
     def whole_track_records(self, log_time: int) -> Iterator[MessageRecords]:
-        """Yield two messages with the track up to the newest row, with a point each second: as a line and as points.
+        """Yield two messages with the track up to the newest row: as a line and as points.
+
+        The track has one point per second.
 
         log_time: log time of the messages, ns.
         """

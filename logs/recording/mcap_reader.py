@@ -244,7 +244,7 @@ def _check_data_end(content: bytes, position: int, crc: int) -> None:
 
 
 def _check_summary(file: BinaryIO) -> None:
-    """Read the summary, and check its CRC and the magic at the end of the file; raise _Damage if one is wrong."""
+    """Read the summary, and check its CRC and the magic at the file's end; raise _Damage on an error."""
     crc = 0
     while True:
         position = file.tell()

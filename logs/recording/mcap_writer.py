@@ -567,7 +567,9 @@ def _index_messages(
 def lay_out_chunks(
     rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], prefix: bytes, limit: int
 ) -> Layout:
-    """Order message records by time, divide them into chunks of at most one second and `limit` bytes, and index them.
+    """Order message records by time, divide them into chunks, and index them.
+
+    A chunk covers at most one second and has at most `limit` bytes.
 
     A message of more than `limit` bytes gets a chunk of its own.  At equal times, a row comes after other messages.
 

@@ -133,7 +133,9 @@ def log_channels(path: Path) -> list[LogChannel]:
 
 
 def _parse_messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
-    """Yield the messages of one chunk, and add the schemas and channels that it declares to the two dictionaries.
+    """Yield the messages of one chunk.
+
+    The schemas and channels that the chunk declares are added to the two dictionaries.
 
     data: records of the chunk.
     schemas, channels: schemas and channels of earlier chunks, by number.

@@ -89,7 +89,9 @@ INTERRUPTED = "interrupted"
 
 
 class Recorder:
-    """Writer of a flight log; as a context manager, it leaves a readable file if the flight raises an error.
+    """Writer of a flight log.
+
+    As a context manager, it leaves a readable file if the flight raises an error.
 
     The setup is written first; then each whole second of flight is written and flushed, so that a killed process loses
     at most the last second.  The log is locked against other processes, and a signal is delayed until a call has ended.
@@ -300,7 +302,10 @@ class Recorder:
             self._close_file()
 
     def _open_file(self, setup: FlightSetup) -> None:
-        """Open the file, replacing an existing one, and write the setup: attachments, channels and static scenes."""
+        """Open the file, replacing an existing one, and write the setup.
+
+        The setup consists of attachments, channels and static scenes.
+        """
         attachments = pack_setup(setup)
         self._file = self._path.open("wb", buffering=_BUFFER_BYTES)
         try:
@@ -377,7 +382,9 @@ class Recorder:
     def _write_messages(
         self, other_messages: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES
     ) -> None:
-        """Write rows and other messages in chunks, in order of time; at equal times, a row comes after other messages.
+        """Write rows and other messages in chunks, in order of time.
+
+        At equal times, a row comes after other messages.
 
         other_messages: message records of all channels except the channel of the rows.
         log_times: log time of each row, ns, (t,).

@@ -478,7 +478,10 @@ def _json_bytes(data: Any) -> bytes:
 
 
 def _finite_or_text(data: Any) -> Any:
-    """Return a copy of nested data in which strings replace non-finite numbers, because JSON has no such numbers."""
+    """Return a copy of nested data with strings in place of non-finite numbers.
+
+    JSON has no such numbers.
+    """
     if isinstance(data, float) and not math.isfinite(data):
         return str(float(data))
     if isinstance(data, dict):

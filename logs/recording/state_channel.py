@@ -1,4 +1,6 @@
-"""Encode and decode the `/state` channel: rows of the track as protobuf messages, by numpy arrays of their bytes.
+"""Encode and decode the `/state` channel: rows of the track as protobuf messages.
+
+The bytes are arranged by numpy arrays.
 
 Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
 messages are one structured array. Any protobuf parser reads them. The schema is built here, so that no protoc is
@@ -39,7 +41,10 @@ _LENGTH_DELIMITED = 2
 
 
 def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return numpy fields for doubles, each preceded by a one-byte field `tag_<name>` for its protobuf tag."""
+    """Return numpy fields for doubles, each after a one-byte field for its protobuf tag.
+
+    The field of the tag is named `tag_<name>`.
+    """
     return [field for name in names for field in ((f"tag_{name}", "u1"), (name, "<f8"))]
 
 
@@ -315,7 +320,10 @@ class RowMatcher:
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
-        """Return the consecutive records from byte `offset` on that have the expected layout, (n,) of `RECORD`."""
+        """Return the consecutive records from byte `offset` on that have the expected layout.
+
+        The result is an array (n,) of `RECORD`.
+        """
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
         matching_count = _count_matching(raw, self._columns, self._expected)

@@ -1,4 +1,7 @@
-"""Describe the conditions of a verdict: aircraft, speed, weather and world, in the lines after the answer."""
+"""Describe a verdict's conditions, in the lines after the answer.
+
+The conditions are aircraft, speed, weather and world.
+"""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,6 @@
-"""Define the data classes of ``verdict.json``, from which its JSON schema is made: a verdict with its texts.
+"""Define the data classes of ``verdict.json``: a verdict with its texts.
+
+The JSON schema is made from these classes.
 
 `logs.verdict.verdict.Verdict.document` fills them.
 """

@@ -106,7 +106,9 @@ class Finding:
 
     @property
     def state(self) -> State:
-        """State of the finding, as shown by signs and colors: "ok", "fail", "open" or "unjudged" (see `State`).
+        """State of the finding: "ok", "fail", "open" or "unjudged" (see `State`).
+
+        Signs and colors show the state.
 
         >>> make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT).state
         'open'
@@ -339,7 +341,9 @@ def _rounded_or_none(value: float | None) -> float | None:
 
 
 def worst_first_key(finding: Finding) -> tuple[int, float]:
-    """Return a sort key that puts failed findings first, then unjudged, then passed, each by increasing margin.
+    """Return a sort key: failed findings first, then unjudged, then passed.
+
+    Each group is sorted by increasing margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> worst_first_key(near) < worst_first_key(far)

@@ -69,7 +69,10 @@ def excess_phrase(noun: str, finding: Finding) -> str:
 
 
 def slope_phrase(noun: str, finding: Finding) -> str:
-    """Return `excess_phrase`, or `reason_phrase` for a limit of 0°, at which the aircraft can fly no slope."""
+    """Return `excess_phrase`, or `reason_phrase` for a limit of 0°.
+
+    With a limit of 0°, the aircraft can fly no slope.
+    """
     return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
 
 

@@ -1,4 +1,6 @@
-"""Judge whether a flight shows that its plan is flyable; every number is computed again from the track.
+"""Judge whether a flight shows that its plan is flyable.
+
+Every number is computed again from the track.
 
 Data that guidance recorded about itself (leg, cross-track, height error, clearance) and any recorded verdict are not
 read.

@@ -1,4 +1,7 @@
-"""Judge without a flight: a route by its geometry, a flight that never began, or a plan that is not feasible."""
+"""Judge without a flight.
+
+This covers a route by its geometry, a flight that never began, and a plan that is not feasible.
+"""
 
 import math
 
@@ -178,7 +181,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
 
 
 def _infeasible_finding(plan: Plan) -> Finding:
-    """Return a failed finding of the completion rule, whose reason lists the failures of an infeasible plan."""
+    """Return a failed completion finding, whose reason lists the failures of an infeasible plan."""
     first_problem, *other_problems = plan.failures
     fault = message(
         f"no feasible plan was found: {first_problem}", "".join(f"; {problem}" for problem in other_problems)

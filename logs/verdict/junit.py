@@ -1,4 +1,7 @@
-"""Write answers as JUnit XML for continuous integration; a verdict has a case for its answer and for each finding."""
+"""Write answers as JUnit XML for continuous integration.
+
+A verdict has a case for its answer and for each finding.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -98,7 +101,9 @@ def verdict_suite(name: str, lines: Sequence[str], rows: Iterable[FindingRow], *
 
 
 def junit_error_text(name: str, message: str) -> str:
-    """Return the text of a JUnit file with one erroneous test case, for a plan or flight that could not be judged.
+    """Return the text of a JUnit file with one erroneous test case.
+
+    It reports a plan or flight that could not be judged.
 
     name: name of the plan or flight.
     message: reason in one line.

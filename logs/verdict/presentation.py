@@ -79,7 +79,9 @@ def limit_with_tolerance_text(finding: Finding) -> str:
 
 
 def short_text(finding: Finding, *, with_tolerance: bool = False) -> str:
-    """Return a finding in a few words: its rule, and its value and limit if it passes, otherwise its brief reason.
+    """Return a finding in a few words.
+
+    The text has its rule, and its value and limit if it passes, otherwise its brief reason.
 
     with_tolerance: True to state the tolerance apart from the limit.
 
@@ -262,7 +264,10 @@ def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
 
 
 def near_threat_text(name: str, distance: float, navigation_error: float) -> str:
-    """Describe a missile near a leg: its name, its distance outside the sphere, and a navigation error, all in m."""
+    """Describe a missile near a leg.
+
+    The text has its name, the distance outside its sphere, and the navigation error, both in m.
+    """
     error_text = f" (navigation error {quantity_text(navigation_error, 'm')})" if navigation_error > 0.0 else ""
     return f"{RULE_WORDS['threat'].word} {name} {quantity_text(distance, 'm')} away{error_text}"
 
@@ -375,7 +380,10 @@ class RuleFindings:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Row of the rule in a table with `RESULT_COLUMNS`; a rule that was not judged has its reason as place."""
+        """Row of the rule in a table with `RESULT_COLUMNS`.
+
+        For a rule that was not judged, the reason is in the column of the place.
+        """
         place = self.shown.where if self.shown else "" if self.judged_count else self.findings[0].reason
         numbers = number_texts(self.shown) if self.shown else NumberTexts()
         return (self.words.word, state_text(self.state), self.tally_text, place, *numbers)

@@ -1,4 +1,6 @@
-"""Define a rule of the verdict: how it judges on each level, what data it needs from a log, and its tolerances.
+"""Define a rule of the verdict.
+
+A rule states how it judges on each level, what data it needs from a log, and its tolerances.
 
 Each file in `logs/verdict/rules/` makes its own `Rule`; `logs.verdict.rules.registry.RULES` lists them.  Code that
 judges uses that list; code that shows a verdict reads `logs.verdict.rule_words.RULE_WORDS`.

@@ -1,4 +1,6 @@
-"""Define the texts and units of each rule, without its judging: name, title, question, unit, scale, urgency.
+"""Define the texts and units of each rule, without its judging.
+
+They are name, title, question, unit, scale and urgency.
 
 `logs.verdict.rules.registry.RULES` contains the judging functions.  All code that shows a verdict reads this table.
 """

@@ -1,4 +1,6 @@
-"""Suggest the smallest changes that make a finding pass, such as a gentler slope, a longer leg or a lower airspeed.
+"""Suggest the smallest changes that make a finding pass.
+
+Examples are a gentler slope, a longer leg and a lower airspeed.
 
 Each public function takes the route's requirements, the aligned track (None if nothing was flown) and the failed
 finding; each `Rule` names the function that suggests changes for its findings.  The suggestions are alternatives, the
@@ -386,7 +388,9 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
 
 
 def _level_speeds(requirements: RouteRequirements, altitude: float, current_speed: float, factor: float) -> list[float]:
-    """Return commanded airspeeds for level flight at an altitude (m AMSL), m/s, the closest to `current_speed` first.
+    """Return airspeed commands for level flight at an altitude (m AMSL), m/s.
+
+    The airspeed closest to `current_speed` comes first.
 
     They are multiples of `SUGGESTION_SPEED_STEP_MPS`, and at least `MIN_SUGGESTED_SPEED_RATIO` times the slowest level
     speed.  If the maximum airspeed is uncertain, only airspeeds that are certainly possible are returned.
@@ -525,7 +529,10 @@ def lowest_clearance(findings: Sequence[Finding]) -> float:
 
 
 def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
-    """Suggest setting home on the ground if it is more than `HOME_ALTITUDE_TOLERANCE_M` off; otherwise return ()."""
+    """Suggest setting home on the ground; return () if it is there already.
+
+    The tolerance is `HOME_ALTITUDE_TOLERANCE_M`.
+    """
     home, height = setup.mission.home, home_height(setup)
     # The height is NaN if it is unknown.  If the file has no home line, its first item was probably taken for home, and
     # another altitude of this item would not help.
@@ -557,7 +564,9 @@ def _suggest_home_and_higher_legs(requirements: RouteRequirements) -> tuple[Sugg
 
 
 def _suggest_altitude_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
-    """Suggest reading altitudes in a given frame if items fit the terrain only in this frame; otherwise return ().
+    """Suggest another frame for altitudes if the items fit the terrain only in this frame.
+
+    Otherwise return ().
 
     frame: the frame to suggest: GLOBAL_RELATIVE_ALT for items that would be below the ground, GLOBAL for items that
         would be too high above home.
@@ -654,7 +663,9 @@ _MIN_FOLLOWED_RELIEF_M = 20.0
 
 
 def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggestion:
-    """Return changes that let the finding's leg, and all other legs too low over varied ground, follow the ground.
+    """Return changes that let the finding's leg follow the ground.
+
+    All other legs that are too low over varied ground follow it, too.
 
     The end of a changed leg keeps its height above ground, or gets the required height plus `HEIGHT_ERROR_LIMIT_M` if
     that is more.  A leg is not changed if it already follows the ground, or if its item states no height to fly at,
@@ -688,7 +699,10 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
 def suggest_flying_lower(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg lower, below the maximum height above ground; return () if the leg does not exceed it."""
+    """Suggest flying a leg below the maximum height above ground.
+
+    Return () if the leg does not exceed it.
+    """
     heights = [height for height in (finding.planned, finding.flown) if height is not None]
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
@@ -754,7 +768,10 @@ def _suggest_landing_against_wind(
 def suggest_staying_inside(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest lower altitudes if they were misread, then a path further inside the area; () if it stays inside."""
+    """Suggest lower altitudes if they were misread, then a path further inside the area.
+
+    Return () if the path stays inside.
+    """
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)

@@ -43,7 +43,9 @@ _LEVEL_TITLES = {
 
 
 def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return notes for the headline on an uncertain aircraft, a doubtful home altitude, and a missing landing.
+    """Return notes for the headline.
+
+    They concern an uncertain aircraft, a doubtful home altitude, and a missing landing.
 
     The note on home's altitude is left out if a finding already reports it.
     """

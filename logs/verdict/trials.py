@@ -1,4 +1,7 @@
-"""Search candidate changes for one that passes a trial, which may be a flight, a simulated return or a computation."""
+"""Search candidate changes for one that passes a trial.
+
+A trial is a flight, a simulated return or a computation.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar

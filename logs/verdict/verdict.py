@@ -104,7 +104,9 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """True if the verdict is flyable, or is complete and leaves open only checks that a flight cannot decide.
+        """True if the verdict is flyable, or if only checks that a flight cannot decide are open.
+
+        The flight must then be complete.
 
         These checks are `APART_FROM_FLIGHT`: paths from and to the ground, returns to launch and glides, and the common
         area of photos.
@@ -310,7 +312,10 @@ class Verdict:
         return suites_text([self.junit_suite(name)])
 
     def _repr_html_(self) -> str:
-        """Return the verdict as a table for a notebook: rows for each failed finding, and for each rule that passes."""
+        """Return the verdict as a table for a notebook.
+
+        It has a row for each failed finding, and for each rule that passes.
+        """
         rows: list[tuple[str, ...]] = []
         for rule in self.rules:
             word, state, tally, *_ = rule.cells

@@ -97,7 +97,7 @@ def noun_with_place(noun: str, place: Place) -> str:
 
 
 def threat_text(place: Place) -> str:
-    """Return the name of the threat to which a missile or radar belongs, or its number from 1 if it has no name.
+    """Return the name of the threat of a missile or radar, or its number from 1 without a name.
 
     >>> threat_text(Place("missile", 0, name="Alfa")), threat_text(Place("missile", 2))
     ('Alfa', 'threat 3')
@@ -309,7 +309,9 @@ def without_trial(suggestion: Suggestion) -> Suggestion:
 
 
 def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
-    """Return a margin with its sign and unit, and with a note if a negative margin passes within the tolerance.
+    """Return a margin with its sign and unit.
+
+    A note is added if a negative margin passes within the tolerance.
 
     tolerance: the tolerance, in `unit`; None or 0 if it is not known.
 
@@ -403,7 +405,9 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Describe the deciding parameter: its current value, the effect of this value, and the value that would pass.
+    """Describe the deciding parameter.
+
+    The text has its current value, the effect of this value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass'
@@ -434,7 +438,9 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
 
 
 def shorten_statement(statement: str) -> str:
-    """Shorten a statement for a headline at the end of a clause, to 80 characters if its first clause is not longer.
+    """Shorten a statement for a headline at the end of a clause.
+
+    The text has at most 80 characters, unless its first clause is longer.
 
     A first clause of more than 160 characters is cut at the end of a word, but not between number and unit.
 
@@ -502,7 +508,9 @@ _MAX_DIGITS = 9
 
 
 def compared_texts(value: float, limit: float, unit: str, decimals: int | None = None) -> tuple[str, str]:
-    """Format a value and its limit with their unit, with enough digits to show that they differ if they do.
+    """Format a value and its limit with their unit.
+
+    The texts have enough digits to show a difference.
 
     decimals: smallest number of decimals; None for three significant digits.
 

@@ -1,4 +1,4 @@
-"""Compute within which distance a waypoint counts as reached, and how far from its legs a flight may be."""
+"""Compute the distances within which a waypoint counts as reached and a leg as followed."""
 
 import math
 from dataclasses import replace
@@ -180,7 +180,10 @@ def shortcut_distance(requirements: RouteRequirements, first: int, last: int) ->
 
 
 def _shortcut_fits(requirements: RouteRequirements, first: int, last: int) -> bool:
-    """Return True if the turns at both ends of the leg that omits waypoints `first` to `last` fit the route."""
+    """Return True if a leg that omits the waypoints `first` to `last` fits the route.
+
+    The turns at both of its ends must fit.
+    """
     previous_corner, next_corner = first - 1, last + 1
     if not (
         _turn_fits_alone(requirements, previous_corner - 1, previous_corner, next_corner)
@@ -236,7 +239,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
 
 
 def negligible_step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the altitude change of a leg that is too steep, m, if the change is negligible; otherwise None.
+    """Return the altitude change of a too steep leg if it is negligible, m; otherwise None.
 
     The returned change is positive, even in a descent.  A change of up to `NEGLIGIBLE_STEP_M` is negligible.  If a
     sequence of legs around the leg is too steep overall, the altitude change of the whole sequence is used.

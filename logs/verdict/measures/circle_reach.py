@@ -34,7 +34,9 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the hazards within reach of a flight around a center: ground, missiles, zones and the area's edges.
+    """Describe the hazards within reach of a flight around a center.
+
+    Hazards are the ground, missiles, zones and the area's edges.
 
     Return one text for each hazard; [] if there are none.
 
@@ -115,7 +117,9 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _zone_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the zones that a flight within `reach` (m) of a center may violate, or whose ground is unknown.
+    """Describe the zones that a flight within `reach` (m) of a center may violate.
+
+    Zones whose ground is unknown are included.
 
     The zones are checked along rings at several altitudes from `min_altitude` to `max_altitude` (m AMSL).
     center: east and north, m, (2,).

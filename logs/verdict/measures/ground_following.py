@@ -80,7 +80,9 @@ def altitude_error(requirements: RouteRequirements, leg: int, position: Floats) 
 
 
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
-    """Find the part of a ground-following leg on which an aircraft that climbs at a limit falls behind the most.
+    """Find the part of a ground-following leg on which the aircraft falls behind the most.
+
+    The aircraft climbs at a limit.
 
     The ground is sampled in steps of `GROUND_STEP_M`, like ArduPlane's terrain data.  Return None if no part of the leg
     is steeper than the limit, or if the ground or the limit is unknown.

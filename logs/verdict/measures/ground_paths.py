@@ -63,7 +63,7 @@ def straight_path(start: Sequence[float] | Floats, course: float, profile: Profi
 
 
 def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float]:
-    """Return a path's minimum height above ground, m, and the distance along the path at which it occurs, m.
+    """Return a path's minimum height above ground, m, and its distance along the path, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
     """
@@ -119,7 +119,9 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
 
 
 def takeoff_item(setup: FlightSetup) -> tuple[int, MissionItem | None]:
-    """Return the index of the first waypoint with a mission item, and this item if it is a take-off, else None.
+    """Return the index of the first waypoint with a mission item, and the take-off item.
+
+    The item is None if it is no take-off.
 
     The index is 0 if no waypoint has an item.
     """

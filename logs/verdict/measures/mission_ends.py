@@ -1,4 +1,7 @@
-"""Check how a mission begins and ends: take-off and landing that PX4 requires, and ArduPlane's return to launch."""
+"""Check how a mission begins and ends.
+
+PX4 requires a take-off and a landing; ArduPlane may return to launch at the end.
+"""
 
 import math
 
@@ -67,7 +70,9 @@ def unjudged_return_text(setup: FlightSetup) -> str:
 
 
 def missing_home_text(setup: FlightSetup) -> str:
-    """State that ArduPlane's return to launch after the last item cannot be judged, because the mission has no home.
+    """State that the return to launch after the last item cannot be judged without a home.
+
+    This concerns ArduPlane.
 
     Return "" if the mission has a home, or if this return is not judged for another reason.
     """

@@ -1,4 +1,6 @@
-"""Represent a path as moves: straight segments and arcs whose altitude is a parabola over the horizontal distance.
+"""Represent a path as moves: straight segments and arcs.
+
+The altitude of a move is a parabola over its horizontal distance.
 
 The moves of a planned path are its exact segments and arcs; the moves of a flown track are the straight lines from row
 to row.  The same code judges both.

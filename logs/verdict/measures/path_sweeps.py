@@ -24,7 +24,7 @@ _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground, m, and the fraction of the segment at which it occurs.
+    """Return each segment's minimum height above ground, m, and its fraction of the segment.
 
     Both have shape (n - 1,).  The height is NaN if a segment leaves the terrain data; the fraction is then where it
     first does.
@@ -38,7 +38,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
 @compiled
 def _path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground and its fraction of the segment; see `path_clearance`."""
+    """Return each segment's minimum height above ground, and its fraction; see `path_clearance`."""
     return path_clearances(heights, to_pixel, points)
 
 
@@ -236,7 +236,7 @@ class SphereStay:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum height above ground, m, and the fraction of the segment at which it occurs.
+    """Return each track segment's minimum height above ground, m, and its fraction of the segment.
 
     Both have shape (t - 1,).  The height is NaN if the segment leaves the terrain data or has an implausible end.
 

@@ -1,4 +1,4 @@
-"""Measure how much of a photo line was flown so that its photos can be used, and how much a survey's photos overlap."""
+"""Measure the usable part of each photo line, and the overlap of a survey's photos."""
 
 import itertools
 import math
@@ -88,7 +88,10 @@ def is_covered(usable: float, unknown: float) -> bool | None:
 
 
 def lateral_tolerance(requirements: RouteRequirements, survey: Survey) -> float:
-    """Return how far to the side of a survey's line a photo may be taken, m, including the navigation error."""
+    """Return how far to the side of a photo line a photo may be taken, m.
+
+    The navigation error is included.
+    """
     return PHOTO_OFFSET_FRACTION * survey.spacing + position_error(requirements.setup)
 
 
@@ -121,7 +124,10 @@ class _LineRows:
 def _line_rows(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> _LineRows | None:
-    """Return the rows on which a photo line may have been flown; None if it was not reached or has only one row."""
+    """Return the rows on which a photo line may have been flown.
+
+    Return None if it was not reached or has only one row.
+    """
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     # From the waypoint before the line and its leads to the waypoint after them.
     first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
@@ -214,7 +220,9 @@ def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, 
 
 
 def line_distances(axis: LineAxis) -> Floats:
-    """Return the distances along a planned photo line at which it is judged, m, (n,): both ends, and steps between.
+    """Return the distances along a planned photo line at which it is judged, m, (n,).
+
+    These are both ends, and steps between them.
 
     A step is at most `PHOTO_STEP_M`.
     """
@@ -271,7 +279,9 @@ def _camera_on_rows(
 def _switch_radii(
     requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int, track_rows: slice
 ) -> Floats | float:
-    """Return the distance before a waypoint at which the items after it take effect and switch the camera, m.
+    """Return the distance before a waypoint at which its items switch the camera, m.
+
+    The items follow the waypoint in the mission.
 
     The distance is 0 at a gate, which is passed at its plane, and for an autopilot that follows a path.  If it depends
     on the ground speed, it is an array with a distance for each row of `track_rows`.
@@ -285,7 +295,9 @@ def _switch_radii(
 
 
 def planned_switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
-    """Return the distance before a waypoint at which the items after it switch the camera on the planned path, m.
+    """Return the distance before a waypoint at which its items switch the camera, m.
+
+    It applies to the planned path; the items follow the waypoint in the mission.
 
     The distance is 0 at a gate, and for an autopilot that follows a path.
     """
@@ -656,7 +668,9 @@ def _line_strip(
 
 
 def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
-    """Return the overlap of each pair of neighbouring photos as a fraction of a photo, (n,); negative for a gap.
+    """Return the overlap of each pair of neighbouring photos, (n,); negative for a gap.
+
+    The overlap is a fraction of a photo.
 
     distances: distance between the two photos, m, (n,).
     width: width of a photo in the direction of this distance, as a multiple of the height.
@@ -733,7 +747,9 @@ def _with_side_overlap(
 
 
 def _common_area(camera: Camera, distance: float, height: float, crabs: tuple[float, float]) -> float:
-    """Return the common area of two turned photos side by side, as a fraction of a photo, within `_AREA_ERROR`.
+    """Return the common area of two turned photos side by side, within `_AREA_ERROR`.
+
+    The area is a fraction of a photo.
 
     distance: distance between the photos, across the lines, m.
     height: height above ground of both, m.

@@ -1,4 +1,6 @@
-"""Bound the duration of a return to launch from any place of a mission, and the battery time left after the mission.
+"""Bound the duration of a return to launch, and the battery time left after the mission.
+
+The return may start at any place of the mission.
 
 Both bounds are conservative, so that a failsafe that compares the two (PX4's `rtlEstimateCheck`) certainly does not act
 if the battery lasts longer than the return.

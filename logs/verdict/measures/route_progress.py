@@ -178,12 +178,17 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
 
 
 def rtl_waypoints(route: Route) -> range:
-    """Return the waypoints that stand for an RTL, whose actual path the autopilot chooses; empty without an RTL."""
+    """Return the waypoints that stand for an RTL; empty without an RTL.
+
+    The autopilot chooses the actual path of the RTL.
+    """
     return range(0) if route.rtl_start is None else range(route.rtl_start + 1, route.rtl_end)
 
 
 def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
-    """Return the center of an RTL's loiter, m, (2,), and its arrival radius, m; None without an RTL loiter.
+    """Return the center of an RTL's loiter, m, (2,), and its arrival radius, m.
+
+    Return None without an RTL loiter.
 
     An RTL has arrived once the aircraft is within the arrival radius of the center.  A simulated flight arrives within
     the same radius (`flight.simulation.tick.update_rtl_loiter`), which does not depend on the waypoints that represent
@@ -198,7 +203,9 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
 
 
 def return_loiter_reach(route: Route, track: Track) -> float | None:
-    """Return the largest distance from the center of a completed RTL loiter, m; None if it was not completed.
+    """Return the largest distance from the center of an RTL loiter, m.
+
+    Return None if the loiter was not completed.
 
     The loiter is complete after `ENDLESS_LOITER_TIME_S` and one lap.  Both begin when the aircraft is near the center
     and at the loiter's altitude, as in a simulated flight (`flight.simulation.tick.update_rtl_loiter`).  An aircraft

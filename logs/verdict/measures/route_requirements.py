@@ -1,4 +1,4 @@
-"""Compute what a route requires of the aircraft, the limits that apply, and the energy that the route needs."""
+"""Compute the demands of a route on the aircraft, the limits that apply, and the energy it needs."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -165,7 +165,9 @@ def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformanc
 
 
 def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
-    """Return the forecast wind of each leg, at the leg's midpoint and the estimated time there; () without a forecast.
+    """Return the forecast wind of each leg; () without a forecast.
+
+    It is the wind at the leg's midpoint, at the estimated time there.
 
     The time is estimated from the legs before, flown at the ground speed in their wind, and the first half of the leg,
     flown at its airspeed.  If the wind leaves at most 1 m/s of ground speed on a leg, the airspeed replaces the ground
@@ -329,7 +331,9 @@ class FlownGround:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteRequirements:
-    """Numbers of a route for its verdict, computed once: its turns, its legs, the limits, and the planned path.
+    """Numbers of a route for its verdict, computed once.
+
+    They describe its turns, its legs, the limits, and the planned path.
 
     route: the setup's route, with true airspeeds if the autopilot treats commanded airspeeds as equivalent airspeeds.
 
@@ -660,7 +664,10 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, waypoint: int) -> tuple[float, str]:
-    """Return the turn limit at a waypoint, rad, and its source: scenario or aircraft, whichever limits it more."""
+    """Return the turn limit at a waypoint, rad, and its source.
+
+    The source is the scenario or the aircraft, whichever limits it more.
+    """
     return tighter_turn_limit(requirements, waypoint, float(requirements.turn_limit[waypoint]))
 
 

@@ -1,4 +1,7 @@
-"""Measure how each leg was climbed or descended: slope, altitude error, throttle, and climb and sink ability."""
+"""Measure how each leg was climbed or descended.
+
+Measures are slope, altitude error, throttle, and climb and sink ability.
+"""
 
 import math
 from dataclasses import dataclass
@@ -288,7 +291,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg after the time that the change to its commanded airspeed may take; may be empty."""
+    """Return the rows of a leg after the change to its commanded airspeed; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0

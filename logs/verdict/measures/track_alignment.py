@@ -84,7 +84,10 @@ class AlignedTrack:
 
     @cached_property
     def rows(self) -> RowNumbers:
-        """Row of each waypoint, in which its leg starts, (w,); the last row for a waypoint that was not passed."""
+        """Row at which the leg from each waypoint starts, (w,).
+
+        For a waypoint that was not passed, it is the last row.
+        """
         first_rows = np.searchsorted(self.track.leg, np.arange(len(self.apex_distance)))
         return np.minimum(first_rows, len(self.track) - 1)
 
@@ -249,7 +252,7 @@ def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats
 
 
 def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum horizontal distance from a target, m, and the fraction at which it occurs.
+    """Return each track segment's minimum horizontal distance from a target, m, and its fraction.
 
     Both have shape (n - 1,); the fraction is 0 at the start and 1 at the end of the segment.
 
@@ -458,7 +461,7 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return route requirements and aligned track of a flight's airborne part, between take-off and landing.
+    """Return route requirements and aligned track of a flight between take-off and landing.
 
     The track is None if it has fewer than two usable rows.  For a flight without ground phases, both are those of the
     whole route.
@@ -493,7 +496,7 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
 
 
 def takeoff_and_approach_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask (t,): True for the rows of the take-off, and for all rows from the start of the approach leg on.
+    """Return a mask of the rows of the take-off, and from the start of the approach leg on, (t,).
 
     A phase that the flight does not simulate has no rows.  The example's flight has neither phase:
 

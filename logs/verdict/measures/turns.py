@@ -68,7 +68,10 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack, *, fol
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> TurnMeasure:
-    """Measure the turn at an inner waypoint along its arc; all fields have their defaults if a leg was not flown."""
+    """Measure the turn at an inner waypoint along its arc.
+
+    All fields have their defaults if a leg was not flown.
+    """
     if not aligned.has_flown(waypoint - 1) or not aligned.has_flown(waypoint):
         return TurnMeasure()
     track = aligned.track
@@ -193,7 +196,9 @@ NEXT_LEG_FRACTION = 0.7
 def _with_closest_approaches(
     requirements: RouteRequirements, aligned: AlignedTrack, measures: Sequence[TurnMeasure]
 ) -> list[TurnMeasure]:
-    """Return the turn measures with overshoot and minimum distance relative to the corner instead of the arc.
+    """Return the turn measures relative to the corner instead of the arc.
+
+    Overshoot and minimum distance are replaced.
 
     measures: measures of the turns at all inner waypoints, in order.
 
@@ -242,7 +247,10 @@ def _with_closest_approaches(
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return times, s, (n,), and positions, m, (n, 3), of the track between two times, s, with interpolated ends."""
+    """Return times, s, (n,), and positions, m, (n, 3), of the track between two times, s.
+
+    The ends are interpolated.
+    """
     time = aligned.track.time
     times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])

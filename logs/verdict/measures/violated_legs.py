@@ -1,4 +1,6 @@
-"""Find the legs on which a plan violates a threat, a zone or the area, or passes a missile's sphere closely.
+"""Find the legs on which a plan violates a threat, a zone or the area.
+
+Legs that pass a missile's sphere closely are included.
 
 A finding names only the threat, the zone or the area, not the legs.
 """
@@ -15,7 +17,7 @@ from world.arrays import Floats
 
 
 def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
-    """Return the legs of the planned path on which the threat, zone or area of a failed finding is violated.
+    """Return the legs of the planned path that violate a failed finding's threat, zone or area.
 
     For a zone, these are all legs from the first to the last violation.  Return () for a finding of another rule.
     """

@@ -1,4 +1,4 @@
-"""Find waypoints at which an autopilot circled because the aircraft was not at the waypoint's altitude."""
+"""Find waypoints at which an autopilot circled to reach their altitude."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,9 @@ _MAX_NAMED = 4
 
 
 def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> dict[int, float]:
-    """Return the altitude error on arrival, m, positive above, by the waypoint at which the aircraft circled.
+    """Return the altitude error on arrival by the waypoint at which the aircraft circled.
+
+    The error is in m, positive above.
 
     Some autopilots circle at a plain waypoint until they are within their altitude tolerance.  Return {} for an
     autopilot that flies on at any altitude.

@@ -1,4 +1,6 @@
-"""Prepare simulated returns to launch for drawing: the worst paths, and the lowest safe altitudes along the flight.
+"""Prepare simulated returns to launch for drawing.
+
+The drawing has the worst paths, and the lowest safe altitudes along the flight.
 
 Neither is needed to judge returns, and each takes as long as judging them, so they are computed only for a drawing.
 """
@@ -115,7 +117,9 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
 def collect_drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
-    """Collect the data for a drawing of the returns to launch: the worst paths and the lowest safe altitudes.
+    """Collect the data for a drawing of the returns to launch.
+
+    These are the worst paths and the lowest safe altitudes.
 
     starts: places on the route from which the returns were simulated; they are ignored if `returns` is empty.
     glides: glides after an engine failure, if they were simulated.

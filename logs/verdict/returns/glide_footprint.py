@@ -1,4 +1,6 @@
-"""Map the glide footprint: the minimum height above ground from which a site can be reached after an engine failure.
+"""Map the glide footprint of a site.
+
+It is the minimum height above ground from which the site is in reach after an engine failure.
 
 The backward search from the sites (`logs.verdict.returns.glide_map`) gives the minimum altitude for every cell.  This
 module converts it to a height above the cell's ground, and outlines the areas in each band of these heights.
@@ -155,7 +157,9 @@ def cell_outlines(west: float, south: float, side: float, is_chosen: Flags) -> t
 
 
 def outline_parts(area: BaseGeometry) -> tuple[Part, ...]:
-    """Return the outline of each polygon of an area, followed by its holes; outlines run counter-clockwise.
+    """Return the outline of each polygon of an area, followed by its holes.
+
+    Outlines run counter-clockwise.
 
     >>> [ring.shape for ring in outline_parts(shapely.box(0.0, 0.0, 2.0, 1.0))[0]]
     [(5, 2)]

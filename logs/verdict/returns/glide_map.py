@@ -1,4 +1,4 @@
-"""Compute for every cell of a map the minimum altitude from which an aircraft can glide to a destination.
+"""Compute the minimum altitude in each cell of a map for a glide to a destination.
 
 The shortest paths over terrain are searched backwards.  One search begins at the destinations and runs against the
 direction of flight.  The label of a cell is the minimum altitude from which a glide reaches a destination: the label of
@@ -190,7 +190,9 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
 
 def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
-    """Set the mask `is_flat` to False in the cells of exclusion zones whose floor is at most `height` above ground.
+    """Set `is_flat` to False in the cells of exclusion zones near the ground.
+
+    Their floor is at most `height` above ground.
 
     height: m above ground.
     """
@@ -202,7 +204,7 @@ def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: fl
 def _exclude_zone(
     is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
-    """Set the mask `is_flat` to False in the cells of exclusion zone `z` where its floor is at most `height`.
+    """Set `is_flat` to False in the cells of exclusion zone `z` where its floor is at most `height`.
 
     height: m above ground.
     west, south: center of the first cell, m.
@@ -299,7 +301,9 @@ def glide_slopes(
     max_altitude: float,
     possible_winds: PossibleWinds | None = None,
 ) -> GlideSlopes:
-    """Compute the height lost per meter over the ground, by course and by altitude between two altitudes (m AMSL).
+    """Compute the height lost per meter over the ground, by course and altitude.
+
+    The altitudes lie between two altitudes (m AMSL).
 
     airspeed: equivalent airspeed of the glide, m/s.
     possible_winds: winds of a forecast, the worst of which is used on each course; None for the mean wind.

@@ -1,4 +1,4 @@
-"""Compute which destinations an aircraft in flight can reach in a glide, and with how much altitude to spare.
+"""Compute the destinations in reach of a glide, and the altitude that is left there.
 
 The aircraft flies on for a moment, turns to the path to the destination, and glides.  The path comes from a backward
 search (`logs.verdict.returns.glide_map`) that ignores turns.  Therefore the turn is simulated first, to either side, in
@@ -45,7 +45,7 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left on arrival at each start's best destination, m, and the destination's cell, (n,) each.
+    """Return the altitude left at each start's best destination, m, and its cell, (n,) each.
 
     starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
@@ -114,7 +114,10 @@ def _fill_altitudes_left(
     altitude_left: Floats,
     reached_cells: Codes,
 ) -> None:
-    """Fill `altitude_left` (m) and `reached_cells` for each start, by simulating a left and a right turn to a glide."""
+    """Fill `altitude_left` (m) and `reached_cells` for each start.
+
+    A left and a right turn to a glide are simulated.
+    """
     state_array = np.zeros(1, _TURN_STATE)
     state = state_array[0]
     max_speed = aircraft.first_airspeed + (excess_table.shape[1] - 1) * aircraft.airspeed_step

@@ -1,4 +1,6 @@
-"""Judge which destinations are in reach after an engine failure, by the autopilot's own RTL and by the best path.
+"""Judge the destinations in reach after an engine failure.
+
+Both the autopilot's own RTL and the best path are judged.
 
 ArduPlane does not detect an engine failure: its return to launch is simulated without thrust by its control law
 (`flight.autopilots.arduplane.rtl_point_mass`), straight to its target and onto its slope.  The RTL of other autopilots
@@ -264,7 +266,9 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, top_altitude, winds)
 
     def search_glides_to(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        """Return each start's altitude left on arrival, m, its reached cell, and the map of minimum altitudes, m.
+        """Return each start's altitude left on arrival, m, its cell, and the minimum altitudes, m.
+
+        The minimum altitudes are a map.
 
         cells: rows and columns of the destinations, (c, 2).
         """

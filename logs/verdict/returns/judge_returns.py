@@ -336,7 +336,9 @@ def worst_first_key(ret: SimulatedReturn) -> tuple[int, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReturnWorld:
-    """Setting in which returns to launch are simulated: autopilot, destinations, aircraft, ground, spheres and zones.
+    """Setting in which returns to launch are simulated.
+
+    It holds autopilot, destinations, aircraft, ground, spheres and zones.
 
     autopilot: simulated autopilot that returns; it has an RTL.
     home, rally: positions on the map.
@@ -504,7 +506,10 @@ def unknown_energy_text(setup: FlightSetup) -> str:
 
 
 def rtl_autopilot_title(setup: FlightSetup) -> str:
-    """Return the title of the autopilot whose RTL is simulated: the setup's, or ArduPlane's if it has no RTL."""
+    """Return the title of the autopilot whose RTL is simulated.
+
+    It is the setup's autopilot, or ArduPlane if that has no RTL.
+    """
     autopilot = setup.autopilot.model
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
@@ -662,7 +667,10 @@ _NO_PATH: Floats = np.zeros((0, 3))
 
 
 def flies_landing_approach(targets: Sequence[ReturnTarget]) -> Flags:
-    """Return a mask (n,): True for each target whose return continues along the mission's approach to a landing."""
+    """Return a mask of the targets whose return continues along an approach to a landing, (n,).
+
+    The approach is the mission's.
+    """
     return np.array([target.landing is not None and bool(target.landing.next_stops) for target in targets], np.bool_)
 
 
@@ -706,7 +714,9 @@ def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
 
 
 def possible_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Return the height above ground that the RTL from each start can keep, at most `ReturnWorld.limit`, m, (n,).
+    """Return the height above ground that the RTL from each start can keep, m, (n,).
+
+    It is at most `ReturnWorld.limit`.
 
     It is less than this limit from a start at which the flight itself is below the limit, or soon will be.  From a low
     start in a take-off or landing, it is at most `_LOW_START_FRACTION` of the height of the start.
@@ -948,7 +958,9 @@ def _with_offsets(
 
 
 def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
-    """Return True if a JSBSim flight can begin at a start: its bank is small, and its airspeed is sufficient.
+    """Return True if a JSBSim flight can begin at a start.
+
+    Its bank must be small, and its airspeed sufficient.
 
     row: the start, of dtype `RETURN_START`.
     """

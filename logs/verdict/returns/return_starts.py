@@ -1,4 +1,4 @@
-"""Sample the starts of simulated returns to launch (RTL) at intervals along a flight or a planned path."""
+"""Sample the starts of simulated returns to launch (RTL) along a flight or a planned path."""
 
 import math
 from dataclasses import dataclass
@@ -76,7 +76,9 @@ class ReturnStarts:
 def return_starts(
     setup: FlightSetup, track: Track | None, interval: float, requirements: RouteRequirements | None = None
 ) -> ReturnStarts:
-    """Sample the starts of simulated returns to launch on the flown track or, without a flight, on the planned path.
+    """Sample the starts of simulated returns to launch on the flown track.
+
+    Without a flight they lie on the planned path.
 
     track: flown track; None or without rows if there is none.
     interval: time between two starts, s.
@@ -322,7 +324,9 @@ def return_start_at_path_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, m/s, or the true airspeed if the wind is too strong.
+    """Return the ground speed on each leg in the mean wind, m/s.
+
+    It is the true airspeed if the wind is too strong.
 
     In a forecast, the wind is taken at the midpoint of the leg and the time when the aircraft is there.
     """

@@ -104,7 +104,9 @@ def unjudged_parts_text(parts: Sequence[str]) -> str:
 
 
 def return_law_lines(setup: FlightSetup) -> list[str]:
-    """Return lines on simulated returns to launch: the autopilot's control law, their path, and unjudged parts.
+    """Return lines on simulated returns to launch.
+
+    They state the autopilot's control law, the path of the returns, and unjudged parts.
 
     Return [] for a mission without a home.
     """
@@ -350,7 +352,9 @@ def return_range_text(return_range: ReturnRange, returns: Returns, scenario: Sce
 
 
 def _height_text(ret: SimulatedReturn, limit: float) -> str:
-    """Return the lowest height above ground of a return as text, with more digits near the required height.
+    """Return a return's lowest height above ground as text.
+
+    Near the required height the text has more digits.
 
     If this is `limit` (m), the text near it also states the requirement and its tolerance.
     """

@@ -1,4 +1,6 @@
-"""Suggest changes that make every return to launch safe: other parameters (`ReturnTrials`), or rally points.
+"""Suggest changes that make every return to launch safe.
+
+These are other parameters (`ReturnTrials`), or rally points.
 
 The suggested altitude is the lowest that was found, and the number of rally points is the smallest.  Each suggestion is
 simulated from all starts, like judged returns.  Plain set cover does not work for rally points: the autopilot goes to
@@ -260,7 +262,10 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
 
 class _AltitudeSearch:
-    """Search, upwards from the present value, for the lowest sufficient RTL altitude above the destination."""
+    """Search upwards for the lowest sufficient RTL altitude above the destination.
+
+    The search starts at the present value.
+    """
 
     def __init__(self, world: ReturnWorld, present_values: Mapping[str, float]) -> None:
         """Prepare the heights to try.

@@ -1,4 +1,4 @@
-"""The bounds rule: judge how far the path stays inside the area's edges, above its floor and below its ceiling."""
+"""The bounds rule: judge the distance of the path from the area's edges, floor and ceiling."""
 
 import math
 

@@ -204,7 +204,9 @@ class _Landing(NamedTuple):
 
 
 def _find_landing(requirements: RouteRequirements) -> _Landing | None:
-    """Return the landing of a mission; None without a landing, or for one whose path to the ground is not judged.
+    """Return the landing of a mission.
+
+    Return None without a landing, or if its path to the ground is not judged.
 
     Without a `[landing]` in the scenario, a simulated flight ends in the air over the landing point.  This rule then
     leaves the descent to the rules `landing` and `approach`.  In an imported log, the descent ends on the ground.
@@ -268,7 +270,10 @@ def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float]
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
-    """Return the source of a required height above ground (m): "near the field" if it is below the usual limit."""
+    """Return the source of a required height above ground (m).
+
+    It is "near the field" if the height is below the usual limit.
+    """
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
@@ -333,7 +338,9 @@ def _flown_finding(
     *,
     is_planned_short: bool,
 ) -> Finding:
-    """Judge the minimum height above ground on a flown leg; the finding is not judged if the leg was not flown.
+    """Judge the minimum height above ground on a leg.
+
+    The finding is not judged if the leg was not flown.
 
     planned_height: minimum height above ground of the planned path, m, which is only reported.
     is_planned_short: True if the planned path is lower than required.

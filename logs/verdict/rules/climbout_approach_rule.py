@@ -1,4 +1,6 @@
-"""The climb-out and approach rules: judge obstacles on the climb from home and on the glide to the landing point.
+"""The climb-out and approach rules: judge obstacles after the take-off and before the landing.
+
+Judged are the climb from home, and the glide to the landing point.
 
 A planfly flight begins and ends in the air, unless its scenario has a launch or a strip; the launch rule and the
 touchdown rule judge these flown parts.  Other departures and approaches are not flown.  They are laid out from the

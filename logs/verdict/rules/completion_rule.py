@@ -96,7 +96,9 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; not judged if the log may lack a part of the flight.
+    """Judge if an imported flight completed its mission.
+
+    It is not judged if the log may lack a part of the flight.
 
     stretches: legs that were flown in each stretch of the log.
     log_complete: True if planfly's own log of the flight is not cut off.
@@ -174,7 +176,9 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
 def _unflown_legs(
     setup: FlightSetup, flown_stretches: Sequence[FlownLegs], flown_legs: set[int]
 ) -> tuple[list[int], list[str]]:
-    """Return the legs that were certainly not flown, and texts on legs that were not recorded or only partly flown.
+    """Return the legs that were certainly not flown, and texts on incomplete legs.
+
+    The texts name legs that were not recorded or only partly flown.
 
     flown_legs: indices of the legs that were flown completely.
     """

@@ -1,4 +1,4 @@
-"""The energy rule: compare the energy that the flight uses, predicted and flown, with the usable energy."""
+"""The energy rule: compare the energy used, predicted and flown, with the usable energy."""
 
 import math
 from contextlib import suppress
@@ -146,7 +146,9 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
-    """Return one fault on an endless jump, with the number of rounds that the energy permits; [] without such a jump.
+    """Return a fault with the number of rounds of an endless jump that the energy permits.
+
+    Return [] without such a jump.
 
     A round is one repetition of the items between the jump and its destination.
     usable_energy: energy without the reserve, Wh.

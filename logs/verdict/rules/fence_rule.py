@@ -1,4 +1,6 @@
-"""The fence rule: judge how far planned path and flight are inside exclusion zones or outside inclusion zones.
+"""The fence rule: judge how deep planned path and flight violate zones.
+
+They are to stay outside exclusion zones and inside inclusion zones.
 
 The zones are those of the scenario and of the mission's own fence.  The rule judges the path's line, including arcs,
 loiters and jumps; it only reports a corridor that reaches into a zone.
@@ -49,7 +51,7 @@ def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Return one finding for each zone that the planned path or the flight touches; [] if there are no zones.
+    """Return a finding for each zone that the path or the flight touches; [] without zones.
 
     If no zone is violated, the first finding states this.  A fence that cannot be converted to zones yields a finding
     that is not judged.

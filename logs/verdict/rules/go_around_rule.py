@@ -462,7 +462,9 @@ def _judge_go_around(
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Find the next higher climb height above home with which all go-arounds are clear, m; NaN if there is none.
+    """Find the next higher climb height with which all go-arounds are clear, m.
+
+    The height is above home; NaN if there is none.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     worst_distance: abort point to try first, as a distance before the landing point, m.

@@ -1,4 +1,6 @@
-"""The height rule: judge the maximum height above ground on each leg, and the ceiling, planned and flown.
+"""The height rule: judge the maximum height above ground on each leg, and the ceiling.
+
+Both are judged as planned and as flown.
 
 The rule applies if the scenario has a `max_height_m`; without it, the bounds rule judges the ceiling.
 """
@@ -63,7 +65,7 @@ def height_findings(
 
 
 def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's maximum height above ground, m, and the fraction of the segment at which it occurs.
+    """Return each segment's maximum height above ground, m, and its fraction of the segment.
 
     Both have shape (n - 1,).  The height is exact for ground that is interpolated bilinearly, and NaN if a segment
     leaves the terrain data.  It is computed as a minimum height, with path and ground turned upside down.

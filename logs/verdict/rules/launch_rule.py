@@ -113,7 +113,9 @@ def launch_findings(
 
 
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
-    """Return the minimum height above ground after the launch run, m, and the distance along the path there, m.
+    """Return the minimum height above ground after the launch run, m, and its distance, m.
+
+    The distance is along the path.
 
     The launch run is the first `LAUNCH_RUN_M`, or on a runway all of the path up to lift-off if that is longer.  The
     height is inf if the take-off ends within it, and NaN without terrain; the distance is then NaN.

@@ -179,7 +179,9 @@ def _judge_reaction_returns(
     reactions: Sequence[LinkLossReaction],
     fly_again: FlyAgain | None,
 ) -> Returns | None:
-    """Simulate and judge the returns to launch that begin in outages, from the time when the autopilot notices them.
+    """Simulate and judge the returns to launch that begin in outages.
+
+    A return begins when the autopilot notices the outage.
 
     Return None if the autopilot does not react with a return, or for a mission without a home.
 
@@ -211,7 +213,9 @@ def _judge_reaction_returns(
 
 
 def _link_text(link_along_path: LinkAlongPath, leg: Place | None) -> str:
-    """Describe the smallest margin of the link, the outages, and the place and time of the smallest margin.
+    """Describe the smallest margin of the link, and the outages.
+
+    The text has the place and time of the smallest margin.
 
     leg: leg of the smallest margin; None if no margin is known.
     """

@@ -1,4 +1,6 @@
-"""The loiter rule: judge whether a loiter can be held within the bank limit in this wind, and was flown to its end.
+"""The loiter rule: judge if a loiter can be held within the bank limit, and was completed.
+
+The wind is taken into account.
 
 A loiter is flown as corners around its circle, each judged like any turn.  The findings on the corners of a loiter are
 merged into one, and each rule keeps only its worst finding on the legs between the corners.
@@ -100,7 +102,10 @@ def merge_loiter_findings(
         positions.setdefault((finding.rule, finding.place), []).append(k)
 
     def remaining_findings(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
-        """Return index and finding for each finding of these rules at these places that is not merged yet, in order."""
+        """Return index and finding for each finding of these rules and places, in order.
+
+        Findings that are already merged are left out.
+        """
         indices = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
@@ -178,7 +183,10 @@ def end_loiter_findings(
 def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
-    """Judge one loiter by its radius, its laps, and the findings on its corners, which the new finding replaces."""
+    """Judge one loiter by its radius, its laps, and the findings on its corners.
+
+    The new finding replaces those findings.
+    """
     # A flight that ended before a corner does not fail there: the completion rule judges the early end.
     corner_findings = [
         replace(finding, ok=None)
@@ -386,7 +394,7 @@ def _stated_loiter(requirements: RouteRequirements, circle: LoiterCircle) -> Loi
 def _measure_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle
 ) -> tuple[Floats, float]:
-    """Return the distances of the track's rows from a loiter's center, m, (n,), and the number of laps flown.
+    """Return the distances of the track's rows from a loiter's center, m, (n,), and the laps flown.
 
     The distances are taken between the first and the last corner, the laps between the waypoints before and after the
     loiter.  Without a flight that passed the last corner, the array is empty and the number is NaN.  The number is also

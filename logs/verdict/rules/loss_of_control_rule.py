@@ -1,4 +1,7 @@
-"""The `departure` rule: judge loss of control by unusable rows, extreme bank, low airspeed and ground contact."""
+"""The `departure` rule: judge loss of control.
+
+Its signs are unusable rows, extreme bank, low airspeed and ground contact.
+"""
 
 import math
 

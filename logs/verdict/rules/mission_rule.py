@@ -1,4 +1,4 @@
-"""The mission rule: report items that PX4's feasibility checker would refuse, under the names of PX4's checks.
+"""The mission rule: report items that PX4 would refuse, under the names of its checks.
 
 The checks follow `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with PX4's
 parameters: FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed-wing default, 2, requires a landing), and MIS_DIST_1WP 10 km.  These
@@ -157,7 +157,9 @@ _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:
-    """Return a finding on a waypoint inside the circle of a loiter, or on two loiters without a common tangent.
+    """Return a finding on a waypoint or loiter to which no tangent leads.
+
+    The waypoint lies inside the circle of a loiter, or two loiters have no common tangent.
 
     The path to such a waypoint or loiter is not laid out, so it cannot be judged, and the finding fails.  For an
     imported flight the finding is not judged: see `logs.verdict.rules.completion_rule.imported_completion_finding`.
@@ -193,7 +195,9 @@ _REENTRY_MARKS = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
 
 
 def _unreached_findings(setup: FlightSetup) -> list[Finding]:
-    """Return a finding on navigation items after the mission's end, which are never reached, or [] without any.
+    """Return a finding on navigation items after the mission's end; [] without any.
+
+    These items are never reached.
 
     Items after a return to launch fail.  Items after a landing or an endless loiter are reached only if the pilot
     selects the next item, so they leave the verdict undecided.  Three kinds of items are not reported: items of a
@@ -234,7 +238,10 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
 
 
 def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
-    """Yield an undecided finding for each item or setting that changes the flight path but is not simulated."""
+    """Yield an undecided finding for each item or setting that is not simulated.
+
+    Only items and settings that change the flight path are reported.
+    """
     remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.checks.follows_terrain:
         items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.points["above_ground"])].tolist()))
@@ -487,7 +494,10 @@ def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin
 
 
 def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield a remark if the first flown item is too far from home, or if there is no home or no flown item."""
+    """Yield a remark if the first flown item is too far from home.
+
+    Another remark states that there is no home or no flown item.
+    """
     flown_items = _flown_items(mission)
     if mission.home is None or not flown_items:
         yield True, None, "no home, so no distance to the first waypoint"
@@ -505,7 +515,10 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield remarks on gates too close to a waypoint, and one on the longest leg if older PX4 releases refuse it."""
+    """Yield remarks on gates too close to a waypoint, and on the longest leg.
+
+    The latter remark is made if older PX4 releases refuse the leg.
+    """
     # Condition gates that are too close to the waypoint before or after the gate.
     flown_items = [
         item

@@ -180,7 +180,9 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
 
 
 def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep each rule's worst finding on the corners of each stop, and its worst finding on the legs to the stop.
+    """Keep each rule's worst finding on the corners and on the legs of each stop.
+
+    The legs are those to the stop.
 
     A stop is a waypoint or a loiter of the mission; a loiter is flown as several corners and legs.
 

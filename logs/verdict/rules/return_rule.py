@@ -84,7 +84,9 @@ def return_findings(
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge a flight's RTL, the RTL after its last item, and the scenario's requirements on returns to launch.
+    """Judge a flight's RTL, the RTL after its last item, and the requirements on returns.
+
+    The scenario states the requirements.
 
     end_reason: "completed" if the flight ended after its RTL loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
@@ -150,7 +152,9 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge with one finding whether RTLs and glides meet the scenario's requirements; [] without requirements.
+    """Judge with one finding if RTLs and glides meet the scenario's requirements.
+
+    Return [] without requirements.
 
     starts: function that samples the starts of RTLs at an interval, s.
     """
@@ -221,7 +225,9 @@ def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _Re
 
 
 def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _RequirementResult:
-    """Answer the requirement that a glide from every start reaches home, a rally point, a landing site or flat ground.
+    """Judge if a glide from every start reaches a destination, as the scenario requires.
+
+    Destinations are home, rally points, landing sites and flat ground.
 
     Starts below the minimum height above ground are omitted.  The aircraft is taking off or landing there, and would
     descend straight ahead.

@@ -1,4 +1,7 @@
-"""The slope rule: judge whether each leg can be climbed or descended at its speed, and how it was flown."""
+"""The slope rule: judge if each leg can be climbed or descended, and how it was flown.
+
+The leg's airspeed is taken into account.
+"""
 
 import math
 from dataclasses import replace
@@ -428,7 +431,7 @@ def _is_arc_within_tolerance(arc: SteepArc, measure: SlopeMeasure) -> bool:
 
 
 def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
-    """State ground speed and wind if the headwind leaves no ground speed in a climb or descent; otherwise "".
+    """State ground speed and wind if a headwind stops a climb or descent; otherwise "".
 
     The aircraft makes no progress if, at the steepest climb or descent, the horizontal part of its airspeed is not
     larger than the headwind.

@@ -1,4 +1,4 @@
-"""The speed rule: compare the commanded airspeed with the envelope, and the flown airspeed with the command."""
+"""The speed rule: compare commanded airspeed with the envelope, and flown with commanded airspeed."""
 
 import math
 from typing import NamedTuple
@@ -193,7 +193,9 @@ def _find_held_speed(
 def _command_notes(
     requirements: RouteRequirements, leg: int, demanded: float, min_speed: float, max_speed: float
 ) -> list[str]:
-    """Describe the airspeed that the mission commands on a leg, and what keeps the aircraft from flying it.
+    """Describe the airspeed that the mission commands on a leg.
+
+    Also state what keeps the aircraft from flying it.
 
     demanded: airspeed as the mission states it, m/s: true airspeed, or equivalent airspeed for some autopilots.
     min_speed, max_speed: range of airspeeds in level flight, m/s.
@@ -274,7 +276,7 @@ def _is_caused_by_vertical_wind(requirements: RouteRequirements, aligned: Aligne
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the minimum and maximum airspeed of level flight on a whole leg, m/s, and faults of the command.
+    """Return minimum and maximum airspeed of level flight on a leg, m/s, and the command's faults.
 
     Both airspeeds are NaN if level flight is impossible at one end of the leg.
 
@@ -306,7 +308,7 @@ def _level_speed_range(
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, the tolerance of this mean, and the minimum one-second mean, all in m/s.
+    """Return a leg's mean airspeed, the mean's tolerance, and the minimum one-second mean, m/s.
 
     The tolerance allows for gusts and for a change of slope at the start of the leg.  Return None if the leg was flown
     steadily for too short a time.

@@ -51,7 +51,9 @@ class _Margin:
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the smallest margin of the airspeed above the stall speed in a bank, in planned turns or in flight.
+    """Judge the smallest margin of the airspeed above the stall speed in a bank.
+
+    It is judged in planned turns or in flight.
 
     A route whose airspeed is below the stall speed in a planned turn also fails after a flight: an autopilot that flew
     faster or banked less does not make the route flyable.  Return [] for a plan without a turn, and for a flight that

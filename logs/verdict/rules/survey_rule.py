@@ -124,7 +124,9 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the minimum overlap of a survey's photos, on which lines it occurs, and the required overlap.
+    """Describe the minimum overlap of a survey's photos.
+
+    The text names its lines and the required overlap.
 
     Return "" if the overlap is unknown.
 
@@ -152,7 +154,10 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def relief_text(measure: OverlapMeasure) -> str:
-    """Describe why photos overlap too little on lines at one altitude above sloping ground, and the remedy."""
+    """Describe why photos overlap too little above sloping ground, and the remedy.
+
+    The lines are at one altitude.
+    """
     planned_text = f", planned {measure.planned_height:.0f} m" if measure.planned_height else ""
     return (
         "the lines are at one altitude and do not follow the terrain: their height above ground ranges from"
@@ -162,7 +167,10 @@ def relief_text(measure: OverlapMeasure) -> str:
 
 
 def crab_text(measure: OverlapMeasure) -> str:
-    """Describe the largest crab angle of a survey's photos, and the area that neighbouring photos have in common."""
+    """Describe the largest crab angle of a survey's photos, and its effect.
+
+    The effect is the area that neighbouring photos have in common.
+    """
     judged_text = (
         "the side overlap is therefore not judged" if measure.is_side_unknown else "the overlap does not include this"
     )
@@ -173,7 +181,9 @@ def crab_text(measure: OverlapMeasure) -> str:
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Return an undecided finding for each turnaround near hazards that is too tight or too steep to fly as drawn.
+    """Return an undecided finding for each unflyable turnaround near hazards.
+
+    Such a turnaround is too tight or too steep to fly as drawn.
 
     The path of such a turnaround is known only after a flight.  The turns onto the first line and off the last line
     are also turnarounds.
@@ -210,7 +220,7 @@ def _is_too_tight(requirements: RouteRequirements, corner: int) -> bool:
 
 
 def _off_altitude_length(requirements: RouteRequirements, first: int, last: int, end: int, tolerance: float) -> float:
-    """Return the length of route after a turnaround on which the aircraft is not yet at the planned altitude, m.
+    """Return the length after a turnaround that is not yet at the planned altitude, m.
 
     The aircraft starts the turnaround at the planned altitude, and then climbs or descends no steeper than its limits.
 
@@ -253,7 +263,9 @@ def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
 def _planned_finding(
     requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int, before: int
 ) -> Finding:
-    """Judge the fraction of a planned photo line that is flown straight, at its altitude and with the camera on.
+    """Judge the usable fraction of a planned photo line.
+
+    It is the fraction flown straight, at its altitude and with the camera on.
 
     number: number of the line in its survey, from 1.
     before: waypoint at which the turnaround before the line begins.
@@ -370,7 +382,9 @@ def _flown_finding(
 
 
 def usable_text(fraction: float) -> str:
-    """Return the usable fraction of a photo line in %, with enough digits to show that it is below its limit.
+    """Return the usable fraction of a photo line in %.
+
+    The text has enough digits to show that the fraction is below its limit.
 
     >>> usable_text(0.9494), usable_text(0.949), usable_text(0.665), usable_text(0.95)
     ('94.9 %', '94.9 %', '66 %', '95 %')
@@ -382,7 +396,9 @@ def usable_text(fraction: float) -> str:
 
 
 def unusable_parts_text(measure: LineMeasure) -> str:
-    """List the causes that make parts of a photo line unusable, with the fraction of each, the largest first.
+    """List the causes that make parts of a photo line unusable, the largest first.
+
+    Each cause has its fraction of the line.
 
     Causes with less than 0.5 % of the line are left out.  Return "" if no cause remains.
     """

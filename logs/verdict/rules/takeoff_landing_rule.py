@@ -1,4 +1,4 @@
-"""The take-off and landing rules: judge the slopes of the climb to the take-off waypoint and of the final approach.
+"""The take-off and landing rules: judge the slopes of take-off climb and final approach.
 
 A simulated flight usually begins and ends in the air, so both are judged from the mission's items, whether or not the
 mission was flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper

@@ -1,4 +1,7 @@
-"""The threat rule: judge time and exposure inside each missile's and radar's sphere, planned and flown."""
+"""The threat rule: judge time and exposure inside the spheres of missiles and radars.
+
+Both are judged as planned and as flown.
+"""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,6 @@
-"""The waypoint rule: judge whether each waypoint was reached within the mission's or the autopilot's radius.
+"""The waypoint rule: judge if each waypoint was reached.
+
+The radius is the mission's or the autopilot's.
 
 ArduPlane also considers a waypoint reached, and turns to the next leg, once the aircraft has crossed the line across
 the leg at its end, however far to the side.  For ArduPlane's simulated law, crossing within the corridor is accepted.
