@@ -1,4 +1,6 @@
-"""End a command with a one-line error if ``ulimit -v`` leaves too little address space to import a library.
+"""End a command with a one-line error if the address space is too small for a library.
+
+The limit is that of ``ulimit -v``; the error comes before the library is imported.
 
 OpenBLAS, which NumPy and SciPy contain, requests its buffers in an endless loop while it holds the interpreter: without
 room for them, neither Ctrl-C nor SIGTERM ends the process.  LLVM and others end the process without a message.
@@ -33,7 +35,9 @@ def has_address_space(size: int) -> bool:
 
 
 class AddressSpaceGuard:
-    """Import hook at the head of ``sys.meta_path``; it refuses imports if there is too little address space.
+    """Import hook that refuses imports if there is too little address space.
+
+    It is at the head of ``sys.meta_path``.
 
     limit: address space of this process, bytes.
     """

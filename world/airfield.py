@@ -154,7 +154,9 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReturnRequirements:
-    """Requirements on RTL (return to launch), glides and go-arounds, and RTL settings of the planned mission.
+    """Requirements on RTL (return to launch), glides and go-arounds.
+
+    The RTL settings of the planned mission are included.
 
     require: contains "rtl" if every RTL must be safe, "glide" if the engine may fail anywhere, "go_around" if a landing
         may be aborted anywhere on its glide.

@@ -17,7 +17,9 @@ _Result = TypeVar("_Result")
 
 
 def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-    """Decorate a function of the API so that wrong argument types raise the ArgumentError of `check_types`.
+    """Decorate an API function so that wrong argument types raise an ArgumentError.
+
+    The error is that of `check_types`.
 
     The function has no options; for a function with options use `planfly.api.api_function.api_function`.
 

@@ -1,4 +1,6 @@
-"""Formats of elevation files, and elevation files that planfly ships, without imports that would slow the help.
+"""Formats of elevation files, and elevation files that planfly ships.
+
+The module has no imports that would slow the help.
 
 `world.raster.open_raster` opens them.
 """

@@ -1,4 +1,6 @@
-"""Join several elevation files into one raster: the tiles in a folder, in a GDAL virtual raster (.vrt) or in a list.
+"""Join several elevation files into one raster.
+
+The tiles are in a folder, in a GDAL virtual raster (.vrt) or in a list.
 
 All tiles lie on one grid: the same reference system, the same pitch, and pixels that coincide where tiles overlap.
 Ground that no tile covers is a gap.  This module only reads the names of the files of a virtual raster: GDAL's driver
@@ -126,7 +128,10 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     offsets = [(row - top, col - left) for row, col in positions]
 
     def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
-        """Return the heights of rows r0 to r1 - 1 and columns c0 to c1 - 1, each from the first tile with data."""
+        """Return the heights of rows r0 to r1 - 1 and columns c0 to c1 - 1.
+
+        Each height is from the first tile with data.
+        """
         block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
         for (row, col), tile in zip(offsets, tiles, strict=True):
             first_row, last_row = max(r0, row), min(r1, row + tile.shape[0])

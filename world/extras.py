@@ -117,7 +117,10 @@ def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraErr
 
 
 def requires_extra(name: str, needs: str = "") -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Return a decorator that makes a function call `require_extra` first; arguments as for `require_extra`."""
+    """Return a decorator that makes a function call `require_extra` first.
+
+    The arguments are those of `require_extra`.
+    """
 
     def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         """Return the function with the check before each call."""

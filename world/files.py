@@ -76,7 +76,9 @@ _FOLDER_COMMANDS = {
 
 
 def missing_text(path: Path) -> str:
-    """Return the reason why a path is not a plain file: it does not exist, or it is a folder with certain contents.
+    """Return the reason why a path is not a plain file.
+
+    The path does not exist, or it is a folder with certain contents.
 
     >>> missing_text(Path("missing.plan")), missing_text(Path("/proc/self/task"))
     ('no such file', 'is a folder')

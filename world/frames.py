@@ -1,4 +1,6 @@
-"""Map frames: the azimuthal equidistant plane about an origin, and fast polynomial approximations of conversions.
+"""Map frames: the azimuthal equidistant plane about an origin.
+
+Conversions have fast polynomial approximations.
 
 World axes are ``east, north, up``: east and north in the AEQD plane on WGS84, up the height above mean sea level.
 Altitude is separate from the map, so that the curvature of the Earth does not affect it.
@@ -95,7 +97,9 @@ def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[
 
 
 def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Call a transformation of pyproj with the coordinates of points, and return results of the same shape.
+    """Call a transformation of pyproj on the coordinates of points.
+
+    The results have the shape of the arguments.
 
     For one point, pyproj would lose the shape of the array, and NumPy before 2.4 would warn.
 

@@ -45,7 +45,10 @@ _HORIZONTAL_TAG = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
-    """Open a GeoTIFF of heights in metres, in any reference system. Raises TerrainError for any other file."""
+    """Open a GeoTIFF of heights in metres, in any reference system.
+
+    Raises TerrainError for any other file.
+    """
     return _open_raster_file(file, "GTiff", "not a readable GeoTIFF file")
 
 
@@ -135,7 +138,9 @@ def _raise_unplaced(file: Path) -> NoReturn:
 
 
 def _read_crs(file: Path, driver: str, source: Any) -> str | None:
-    """Return the reference system of an open file as WKT, with its height axis if any; None if the file states none.
+    """Return the reference system of an open file as WKT, with its height axis if any.
+
+    Return None if the file states none.
 
     driver: GDAL driver of the file.
     source: the open file.
@@ -179,7 +184,10 @@ def _make_raster_file(
     middle_longitude = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
 
     def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        """Convert longitudes and latitudes (deg) to fractional columns and rows, counted between pixel centres."""
+        """Convert longitudes and latitudes (deg) to fractional columns and rows.
+
+        Columns and rows are counted between pixel centres.
+        """
         x, y = (
             np.asarray(coordinates)
             for coordinates in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
@@ -190,7 +198,10 @@ def _make_raster_file(
         return col - 0.5, row - 0.5
 
     def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
-        """Convert fractional columns and rows, counted between pixel centres, to longitudes and latitudes (deg)."""
+        """Convert fractional columns and rows to longitudes and latitudes (deg).
+
+        Columns and rows are counted between pixel centres.
+        """
         pixel_x, pixel_y = col + 0.5, row + 0.5
         x, y = a * pixel_x + b * pixel_y + c, d * pixel_x + e * pixel_y + f
         lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")

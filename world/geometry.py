@@ -98,7 +98,9 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Return the distance from a waypoint at which its fly-by arc leaves the first leg, R tan(turn / 2), m.
+    """Return the distance from a waypoint at which its fly-by arc leaves the first leg, m.
+
+    It is R tan(turn / 2).
 
     turn: rad, from 0 to below pi.
     radius: m.

@@ -1,4 +1,6 @@
-"""Vertical datum of an elevation file: mean sea level, or the ellipsoid, which is some 47 m lower in the Alps.
+"""Vertical datum of an elevation file: mean sea level, or the ellipsoid.
+
+The ellipsoid is some 47 m lower in the Alps.
 
 Heights above an ellipsoid are converted with PROJ's grid of the geoid if this machine has it, and rejected otherwise.
 A datum that the user states overrides the datum of the file.

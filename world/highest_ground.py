@@ -1,4 +1,6 @@
-"""Find the highest ground in each cell of a map, exactly for the bilinear surface between a raster's pixels.
+"""Find the highest ground in each cell of a map.
+
+It is exact for the bilinear surface between a raster's pixels.
 
 Between four pixels the surface has no summit of its own.  Its highest point in a square is at a pixel in the square, or
 on the square's sides.
@@ -38,7 +40,9 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell_side: flo
 def _fill_cells(
     heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float, max_heights: Floats
 ) -> None:
-    """Set `max_heights` to the highest ground of each cell: on the sides of the cell, and at the pixels inside it.
+    """Set `max_heights` to the highest ground of each cell.
+
+    It lies on the sides of the cell, or at the pixels inside it.
 
     heights, to_pixel: heights of the terrain, and the map from positions to its pixels.
     west, south, cell_side: outer corner of the first cell, and side of a cell, m.

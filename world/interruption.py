@@ -166,7 +166,9 @@ def children_ignore_sigint() -> Iterator[None]:
 
 
 def end_with_parent(detects_parent_end: threading.Event | None = None) -> None:
-    """Make this child process end at once, and remove its temporary files, on SIGTERM and when its parent ends.
+    """Make this child process end at once on SIGTERM and when its parent ends.
+
+    Its temporary files are removed.
 
     detects_parent_end: event that the process sets when it handles the end of its parent itself; it is then not ended.
 

@@ -26,7 +26,9 @@ _IMPORT = re.compile(rb"((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import
 
 
 def kernel_sources(root: Path) -> dict[str, bytes]:
-    """Return the contents of all source files on which kernels below ``root`` depend, by path below ``root``.
+    """Return the source files on which kernels below ``root`` depend, by path below ``root``.
+
+    The values are the contents of the files.
 
     root: folder of the packages.
 

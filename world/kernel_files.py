@@ -1,4 +1,6 @@
-"""Store compiled kernels in files that begin with a digest, so that a kernel is compiled again if its file is damaged.
+"""Store compiled kernels in files that begin with a digest.
+
+A kernel whose file is damaged is compiled again.
 
 Numba loads its files unchecked: a cut file ends the process with a traceback, and a flipped bit in machine code with a
 segmentation fault.
@@ -19,7 +21,9 @@ _DIGEST_BYTES = 32
 
 
 class CheckedCacheFiles(IndexDataCacheFile):
-    """Cache files of one kernel: an index, and a data file with machine code for each combination of argument types.
+    """Cache files of one kernel: an index, and data files with machine code.
+
+    There is a data file for each combination of argument types.
 
     Each file begins with a digest. A file that is missing, damaged or unreadable is treated as empty. The digest of a
     data file covers the argument types, too.

@@ -41,7 +41,9 @@ class CacheWriteLock:
         listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
     def _track_depth(self, step: int) -> None:
-        """Track how often this thread has taken numba's compiler lock; release the file lock after the last release.
+        """Track how often this thread has taken numba's compiler lock.
+
+        The file lock is released after the last release.
 
         step: 1 when the compiler lock is taken, -1 when it is released.
         """

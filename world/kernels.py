@@ -114,7 +114,9 @@ def inlined(kernel: _Kernel) -> _Kernel:
 
 
 def _make_dispatcher(kernel: Any, **options: bool) -> Any:
-    """Return numba's dispatcher of a function, which compiles it at its first call and caches the machine code.
+    """Return numba's dispatcher of a function.
+
+    It compiles the function at its first call and caches the machine code.
 
     options: further options of `numba.njit`.
     """

@@ -1,4 +1,7 @@
-"""Convert the positions in a scenario file to map positions, and check them: start, destination, threats and others."""
+"""Convert the positions in a scenario file to map positions, and check them.
+
+These are start, destination, threats and others.
+"""
 
 import math
 
@@ -65,7 +68,7 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: 
 
 
 def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: float, ground: Terrain | None) -> None:
-    """Raise ScenarioError for a start or destination in the ground, or above or below the area's altitudes.
+    """Raise ScenarioError for a start or destination in the ground or outside the area's altitudes.
 
     key, source: names of the point and its file in messages.
     point: (3,) m.
@@ -80,7 +83,9 @@ def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: 
 
 
 def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | None) -> None:
-    """Raise ScenarioError for a point that is not above the terrain; accept it where the terrain is unknown.
+    """Raise ScenarioError for a point that is not above the terrain.
+
+    A point over unknown terrain is accepted.
 
     key, source: names of the point and its file in messages.
     point: (3,) m.

@@ -63,7 +63,9 @@ class Population:
 
 
 def density_band(density: float) -> int:
-    """Return the number of the band of a population density (people per km2), between the limits of SORA 2.5.
+    """Return the number of the band of a population density (people per km2).
+
+    The bands lie between the limits of SORA 2.5.
 
     Band 0 is below 5 people per km2, and band 5 starts at 50,000 people per km2.
 
@@ -141,7 +143,10 @@ def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: B
 
 
 def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
-    """Raise PlanflyError unless an open raster has one band of numbers, a position on Earth, and people as its unit."""
+    """Raise PlanflyError unless an open raster can be a population raster.
+
+    It needs one band of numbers, a position on Earth, and people as its unit.
+    """
     number_kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or number_kind not in "iuf":
         allowed = "a population raster has 1 band of numbers"
@@ -256,7 +261,10 @@ class _Window:
         )
 
     def to_lon_lat(self, columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
-        """Convert columns and rows of the window to longitudes and latitudes, deg; integers are corners of cells."""
+        """Convert columns and rows of the window to longitudes and latitudes, deg.
+
+        Integers are corners of cells.
+        """
         lon, lat = self.transformer.transform(*_transformed(self.transform, columns, rows), direction="INVERSE")
         return np.asarray(lon), np.asarray(lat)
 
@@ -285,7 +293,7 @@ class _Window:
         return f"the file covers latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
     def density_bands(self, densities: Floats) -> tuple[tuple[int, BaseGeometry], ...]:
-        """Return (band number, area on the map, m) for each density band that occurs in the window, lowest first.
+        """Return (band number, area on the map, m) for each density band in the window, lowest first.
 
         densities: people per km2, (rows, columns); NaN for cells without data, which are in no band.
         """

@@ -62,7 +62,10 @@ class RadioLink:
 
 
 def station_position(table: LinkTable | None, origin: GeoOrigin) -> tuple[float, float] | None:
-    """Return east and north of the station's antenna that a [link] table states, m; None for the mission's home."""
+    """Return east and north of the station's antenna of a [link] table, m.
+
+    Return None for the mission's home.
+    """
     if table is None or (table.east_m is None and table.lat_deg is None):
         return None
     return map_coordinates(table, origin)
@@ -124,7 +127,9 @@ def earth_bulge(distance: Floats, length: float) -> Floats:
 
 
 def line_of_sight(terrain: Terrain, station: Floats, aircraft: Floats) -> bool | None:
-    """Return True if the straight line between two antennas is clear of the ground; None if the ground is unknown.
+    """Return True if the straight line between two antennas is clear of the ground.
+
+    Return None if the ground is unknown.
 
     station, aircraft: positions of the antennas, (3,) m.
 
@@ -210,7 +215,9 @@ def _bullington_loss(
     aircraft_altitude: float,
     wavelength: float,
 ) -> float:
-    """Return the diffraction loss of a ground profile by the Bullington method, dB (ITU-R P.526-15, section 4.5.1).
+    """Return the diffraction loss of a ground profile by the Bullington method, dB.
+
+    The source is ITU-R P.526-15, section 4.5.1.
 
     excess: height of the ground above the straight line between the antennas, m, (n,).
     fresnel_radii: radius of the first Fresnel zone, m, (n,).
@@ -274,7 +281,9 @@ def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: F
 
 
 def link_margins(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> Floats:
-    """Return the margin of the radio link at each position of the aircraft, dB, (t,); NaN if the ground is unknown.
+    """Return the margin of the radio link at each position of the aircraft, dB, (t,).
+
+    It is NaN if the ground is unknown.
 
     station: position of the station's antenna, (3,) m.
     positions: (t, 3) m.
@@ -286,7 +295,10 @@ def link_margins(link: RadioLink, terrain: Terrain, station: Floats, positions: 
 
 
 def _aircraft_antennas(terrain: Terrain, positions: Floats) -> Floats:
-    """Return positions (t, 3), m, raised to at least `MIN_AIRCRAFT_HEIGHT_M` above ground where the ground is known."""
+    """Return positions raised to at least `MIN_AIRCRAFT_HEIGHT_M` above ground, (t, 3), m.
+
+    Positions over unknown ground are unchanged.
+    """
     antennas = np.array(positions, dtype=np.float64)
     lowest = terrain.height(antennas[:, 0], antennas[:, 1]) + MIN_AIRCRAFT_HEIGHT_M
     antennas[:, 2] = np.fmax(antennas[:, 2], lowest)

@@ -382,7 +382,9 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
-    """Return the derivatives of pixel coordinates by map position at the centre of a box, pixels per m, (2, 2).
+    """Return the derivatives of pixel coordinates by map position, pixels per m, (2, 2).
+
+    They apply at the centre of a box.
 
     Row 0 has the derivatives of the column by east and by north, row 1 the derivatives of the row.
     """
@@ -424,7 +426,7 @@ def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
 def _outline_window(
     raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
-    """Return the first and last column, and the first and last row, of a box on the map and a buffer around it.
+    """Return the first and last column and row of a box on the map and a buffer around it.
 
     box: [[west, east], [south, north]] m.
     buffer: width of the buffer, m.

@@ -1,4 +1,7 @@
-"""Elevation file that was opened and checked: its grid, its position on Earth, and a function to read its heights."""
+"""Elevation file that was opened and checked.
+
+It has its grid, its position on Earth, and a function to read its heights.
+"""
 
 import hashlib
 from collections.abc import Callable
@@ -82,7 +85,7 @@ def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
 
 
 def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
-    """Return the columns and the rows of 84 points along the outline of a raster's pixel centres, (84,) each.
+    """Return columns and rows of 84 points along a raster's outline of pixel centres, (84,) each.
 
     cols, rows: size of the raster.
     """

@@ -1,4 +1,6 @@
-"""Fetch parts of a file on a web server, and keep them on this machine so that each is fetched only once.
+"""Fetch parts of a file on a web server, and keep them on this machine.
+
+Each part is fetched only once.
 
 The copy has the full size of the file, with holes for parts that are not fetched yet; a notes file next to it lists the
 bytes that it contains.  A part is complete when all requested bytes have arrived, from the version of the file that was
@@ -105,7 +107,9 @@ class RemoteFile:
                     time.sleep(_PAUSE * 2.0**attempt)
 
     def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
-        """Fetch the bytes [begin, end) into the copy; fetch the whole file if the server has no range requests.
+        """Fetch the bytes [begin, end) into the copy.
+
+        The whole file is fetched if the server has no range requests.
 
         Raises errors of the connection, and _IncompleteAnswer if the server sends other or fewer bytes. The bytes that
         were received are kept in the copy.
@@ -202,10 +206,16 @@ def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.cl
 
 
 class _TimedHead(http.client.HTTPConnection):
-    """Connection with a time limit for all headers of an answer; a socket's timeout starts again with each byte."""
+    """Connection with a time limit for all headers of an answer.
+
+    A socket's own timeout starts again with each byte.
+    """
 
     def getresponse(self) -> http.client.HTTPResponse:
-        """Return the server's answer once its headers have arrived. Raises OSError if they do not arrive in time."""
+        """Return the server's answer once its headers have arrived.
+
+        Raises OSError if they do not arrive in time.
+        """
         is_late = threading.Event()
 
         def shut_down_connection() -> None:
@@ -313,7 +323,7 @@ def _notes_path(copy: Path) -> Path:
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Return the SHA-256 of each undamaged part [begin, end) of a copy, as listed in the copy's notes file.
+    """Return the SHA-256 of each undamaged part [begin, end) of a copy, as its notes file lists them.
 
     size: size of the copy, bytes. The result is empty if the notes are missing or damaged.
     """

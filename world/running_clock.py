@@ -1,4 +1,7 @@
-"""Clock that stops while this process is stopped: during a laptop's sleep, after Ctrl-Z, or in a debugger."""
+"""Clock that stops while this process is stopped.
+
+A process is stopped during a laptop's sleep, after Ctrl-Z, or in a debugger.
+"""
 
 import time
 from collections.abc import Callable

@@ -77,7 +77,10 @@ _Class = TypeVar("_Class")
 
 
 def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
-    """Decorate `Scenario` so that wrong constructor arguments raise an ArgumentError that names `make_scenario`."""
+    """Decorate `Scenario` so that wrong constructor arguments raise a clear ArgumentError.
+
+    The error names `make_scenario`.
+    """
     initialise = scenario_class.__init__
 
     @wraps(initialise)
@@ -503,7 +506,9 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file or files as one raster; also return a [terrain] table that identifies them.
+    """Open a scenario's elevation file or files as one raster.
+
+    Also return a [terrain] table that identifies them.
 
     base: folder of relative paths.
 
@@ -585,7 +590,9 @@ def _assemble_scenario(
 
 
 def _extend_box(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
-    """Return an area extended to contain a position, or unchanged if the elevation file does not cover the position.
+    """Return an area extended to contain a position.
+
+    The area is unchanged if the elevation file does not cover the position.
 
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
     position: east and north, m; None to return the area unchanged.
@@ -602,7 +609,9 @@ def _extend_box(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position:
 
 
 def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenario:
-    """Return a scenario whose terrain extends to a position (east, north, m), if its elevation file has data there.
+    """Return a scenario whose terrain extends to a position (east, north, m).
+
+    The elevation file must have data there; otherwise the terrain is unchanged.
 
     The scenario itself is returned if its terrain already covers the position, or if its terrain is not from an
     elevation file. Raises TerrainError or ScenarioError for a file that cannot be read or that has changed.
@@ -772,7 +781,9 @@ def read_scenario_forecast(scenario: Scenario) -> Forecast:
 
 
 def _with_forecast_wind(scenario: Scenario) -> Scenario:
-    """Return the scenario with the wind of its forecast, if it names a forecast and the date and time of the flight.
+    """Return the scenario with the wind of its forecast.
+
+    The scenario must name a forecast, and the date and time of the flight.
 
     Of an ensemble, member 0 is used. Any other scenario is returned unchanged. Raises ForecastError if the forecast
     cannot be used.
@@ -889,7 +900,9 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
 
 
 def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
-    """Return a scenario with another time of flight, which selects its active zones and the wind of its forecast.
+    """Return a scenario with another time of flight.
+
+    The time selects its active zones and the wind of its forecast.
 
     at: time span as `world.airspace.zone_times.parse_span` reads it; None to return the scenario unchanged.
 

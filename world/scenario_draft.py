@@ -1,4 +1,7 @@
-"""Make a commented scenario file to start from, for two positions and their terrain, with examples in comments."""
+"""Make a commented scenario file to start from.
+
+It has two positions and their terrain, with examples in comments.
+"""
 
 import json
 import math
@@ -172,7 +175,9 @@ def _find_covered_area(
 
 
 def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
-    """Return the box around two positions with a margin (m) on all sides: [[west, east], [south, north]], (2, 2) m.
+    """Return the box around two positions with a margin (m) on all sides.
+
+    The result is [[west, east], [south, north]], (2, 2) m.
 
     endpoints: east and north of each position, (2, 2) m.
     """

@@ -53,7 +53,7 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
 
 
 def check_scenario(data: Any, source: str) -> ScenarioFile:
-    """Check the data of a scenario that a plan or a log stores, and convert it to the model of a scenario file.
+    """Check the scenario data of a plan or a log, and convert them to the model of a scenario file.
 
     source: name of the plan or log in messages.
 
@@ -218,7 +218,9 @@ _EXPECTED_VALUES = {
 
 
 def expected_values(error_entry: Mapping[str, Any], container: str) -> str:
-    """Return the expected values of a field as text; for an unknown kind of error, return pydantic's message.
+    """Return the expected values of a field as text.
+
+    For an unknown kind of error, return pydantic's message.
 
     error_entry: entry of the list of a pydantic error.
 

@@ -1,4 +1,6 @@
-"""Tables of a scenario file as pydantic models, which reject unknown keys, NaN and out-of-range values.
+"""Tables of a scenario file as pydantic models.
+
+They reject unknown keys, NaN and out-of-range values.
 
 The models mirror the TOML key for key.  `world.scenario_file` reads a file into them, and `world.scenario` turns them
 into a `Scenario`.
@@ -30,7 +32,9 @@ def check_no_line_break(text: str) -> str:
 def in_range(
     min_value: float, max_value: float, *, exclude_min: bool = False, exclude_max: bool = False, also: str = ""
 ) -> AfterValidator:
-    """Make a pydantic validator that allows ``min_value``..``max_value`` and names this range in its error.
+    """Make a pydantic validator that allows ``min_value``..``max_value``.
+
+    Its error names this range.
 
     exclude_min, exclude_max: True to exclude ``min_value`` or ``max_value``.
     also: text for the message about other values that the field allows.
@@ -104,7 +108,10 @@ def _check_latitude(corner: list[float]) -> list[float]:
 
 
 def _make_text_check(parse: Callable[[str], object]) -> Callable[[str], str]:
-    """Make a validator that returns a text unchanged, or raises the ValueError with which a parser rejects it."""
+    """Make a validator that returns a text unchanged.
+
+    It raises the ValueError with which a parser rejects a text.
+    """
 
     def check(text: str) -> str:
         """Return the text; raise ValueError if the parser does not accept it."""
@@ -165,7 +172,10 @@ class ZoneTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_shape(self) -> "ZoneTable":
-        """Raise ValueError unless exactly one shape is stated, completely and with at most `MAX_CORNERS` corners."""
+        """Raise ValueError unless exactly one complete shape is stated.
+
+        The shape has at most `MAX_CORNERS` corners.
+        """
         shapes = ("polygon_m", "polygon_deg", "rings_m", "rings_deg", "radius_m")
         stated_keys = [key for key in shapes if getattr(self, key) is not None]
         if len(stated_keys) != 1:
@@ -429,7 +439,7 @@ class PlannerTable(ScenarioTable):
 
 
 def names_folder(aircraft: str) -> bool:
-    """Return True if the aircraft of a scenario is a folder (a name with a slash), not a built-in aircraft.
+    """Return True if a scenario's aircraft is a folder (a name with a slash), not a built-in aircraft.
 
     >>> names_folder("aerosonde"), names_folder("models/mine")
     (False, True)
@@ -676,7 +686,9 @@ class RallyTable(PointTable):
 
 
 def _check_autoland(value: Any) -> Any:
-    """Return the value; raise ValueError unless it is an allowed value of ArduPlane's RTL_AUTOLAND: 1, 2 or 3.
+    """Return the value if it is an allowed value of ArduPlane's RTL_AUTOLAND: 1, 2 or 3.
+
+    Otherwise raise ValueError.
 
     True and 1.0 are not allowed, although they equal 1.
     """

@@ -58,12 +58,15 @@ class Terrain:
         return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Return the ground height at map positions (m, any shape), m AMSL; NaN without data or off the raster."""
+        """Return the ground height at map positions (m, any shape), m AMSL.
+
+        It is NaN without data or off the raster.
+        """
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
         return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
-        """Return the smallest height of the segment a-b above ground, m, and the fraction of the segment there.
+        """Return the smallest height of the segment a-b above ground, m, and its fraction of the segment.
 
         a, b: ends of the segment, (3,) m.
 
@@ -110,7 +113,9 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 
 @compiled
 def steepest_slopes(heights: Heights, spacing: float) -> Heights:
-    """Return an upper bound on the slope of the ground in each tile of a raster, m per m, (tile rows, tile columns).
+    """Return an upper bound on the slope of the ground in each tile of a raster, m per m.
+
+    The result has the shape (tile rows, tile columns).
 
     heights: m at the pixels, (rows, columns); NaN without data.
     spacing: distance between pixels, m.
@@ -155,7 +160,7 @@ def _ground_heights(
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height of the segment a-b above ground, m, and the fraction of the segment there.
+    """Return the smallest height of the segment a-b above ground, m, and its fraction of the segment.
 
     heights, to_pixel: heights of the terrain, and the map from positions to its pixels.
     a, b: ends of the segment, (3,) m.
@@ -169,7 +174,7 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
 
 @inner
 def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height of each segment of a path above ground, m, and the fraction there, (n - 1,) each.
+    """Return the smallest height above ground of each segment of a path, m, and its fraction, (n - 1,).
 
     points: ends of the segments, m, (n, 3).
 
@@ -193,7 +198,9 @@ def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -
 def _clearance_from_pixel(
     heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats, start_col: float, start_row: float
 ) -> tuple[float, float, float, float]:
-    """Return the results of `segment_clearance`, and the pixel coordinates (column, row) of the segment's end.
+    """Return the results of `segment_clearance`, and the pixel coordinates of the segment's end.
+
+    The coordinates are (column, row).
 
     a, b: ends of the segment, (3,) m.
     start_col, start_row: pixel coordinates of `a`.
@@ -222,7 +229,10 @@ def _clearance_from_pixel(
 
 @inlined
 def _next_crossing(start: float, step: float, fraction: float) -> float:
-    """Return the next fraction above a given one at which start + fraction * step is an integer; inf if none."""
+    """Return the next fraction at which start + fraction * step is an integer; inf if none.
+
+    It is above a given fraction.
+    """
     if step == 0.0:
         return math.inf
     position = start + fraction * step
@@ -234,7 +244,9 @@ def _next_crossing(start: float, step: float, fraction: float) -> float:
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:
-    """Return the smallest height above ground on a straight piece of a segment, m, and the fraction of the piece there.
+    """Return the smallest height above ground on a straight piece of a segment, m.
+
+    Also return the fraction of the piece there.
 
     col0, row0, up0, col1, row1, up1: ends of the piece, in fractional pixels and m AMSL.
 

@@ -1,4 +1,6 @@
-"""Write the terrain of an area as one GeoTIFF, from a folder of tiles or a server of Copernicus GLO-30 tiles.
+"""Write the terrain of an area as one GeoTIFF.
+
+The sources are a folder of tiles, or a server of Copernicus GLO-30 tiles.
 
 The server has the layout of the Copernicus DEM in the AWS registry of open data: a folder for each degree, with a
 cloud-optimised GeoTIFF in it.  Only the blocks that cover the area are fetched.  A degree without a tile is open sea,
@@ -330,7 +332,9 @@ def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _
 
 
 def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Return the heights of an area on the grid of the finest tile, and the affine coefficients of this grid.
+    """Return the heights of an area on the grid of the finest tile.
+
+    Also return the affine coefficients of this grid.
 
     Heights are NaN where there is no tile.
     """

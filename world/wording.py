@@ -71,7 +71,10 @@ def format_number(value: float | None, *, signed: bool = False, digits: int | No
 
 
 def format_quantity(value: float | None, unit: str) -> str:
-    """Return a number and its unit as text, with radians shown as degrees; an en dash if the number is None or NaN."""
+    """Return a number and its unit as text; an en dash if the number is None or NaN.
+
+    Radians are shown as degrees.
+    """
     shown_value, name = display_value(value, unit)
     text = format_number(shown_value)
     if text == NOTHING or not name:

@@ -1,4 +1,6 @@
-"""Limit the corners of a zone's outline, its edges in one place and its crossings, before a check or repair.
+"""Limit the corners of a zone's outline, its edges in one place and its crossings.
+
+The limits apply before a check or a repair.
 
 A repair stores every crossing: a star of 2,000 corners, 80 kB in a file, has 2,000,000 crossings and took 1.7 GB.
 """
@@ -44,7 +46,9 @@ def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = Tr
 
 
 def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, *, closed: bool = True) -> int:
-    """Return the number of pairs of edges that cross or touch; if above ``max_count``, it may be incomplete.
+    """Return the number of pairs of edges that cross or touch.
+
+    A number above ``max_count`` may be incomplete.
 
     rings, closed: as for `check_edges`.
 
@@ -66,7 +70,7 @@ def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, 
 
 
 def _make_edges(rings: Sequence[Sequence[Sequence[float]]], closed: bool) -> tuple[Any, Any]:
-    """Return the edges of rings as shapely lines, and for each edge the index of the next edge in its ring.
+    """Return the edges of rings as shapely lines, and the index of each edge's next edge in its ring.
 
     closed: False for a single open line, which has no edge from its last corner to its first.
     """

@@ -1,4 +1,7 @@
-"""Read the features of a GeoPackage (OGC 12-128r19): polygons and points of its tables, with their columns."""
+"""Read the features of a GeoPackage (OGC 12-128r19).
+
+Features are polygons and points of its tables, with their columns.
+"""
 
 import sqlite3
 from collections.abc import Iterator

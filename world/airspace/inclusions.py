@@ -14,7 +14,9 @@ _CIRCLE_CORNERS = 256
 
 
 def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Return zones with all inclusions merged into one, for an autopilot that must be inside at least one of them.
+    """Return zones with all inclusions merged into one.
+
+    It is used for an autopilot that must be inside at least one of them.
 
     Circles are approximated by inscribed polygons. Exclusions, and a single inclusion, are returned unchanged.
 

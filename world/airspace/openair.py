@@ -1,4 +1,6 @@
-"""Read zones of an OpenAir file: one command a line, with classes, limits, polygons, arcs, circles and airways.
+"""Read zones of an OpenAir file, which has one command per line.
+
+Classes, limits, polygons, arcs, circles and airways are read.
 
 The commands follow WinPilot's original format and Naviter's version 2 (https://github.com/naviter/seeyou_file_formats):
 AC begins an airspace, AN names it, AY is its type, AL and AH are its limits, AA its times; DP, DA, DB, DC and DY draw
@@ -133,7 +135,9 @@ def _clean_line(line: str) -> str:
 
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
-    """Return the location of an airspace in its file, and its [[zones]] entries or the reason why it is skipped.
+    """Return the location of an airspace in its file, and its [[zones]] entries.
+
+    A skipped airspace has the reason in place of the entries.
 
     It is skipped if it is open to all, or has neither a name nor limits nor a shape.
 
@@ -193,7 +197,10 @@ def _read_times(block: _Block, text: str) -> None:
 
 
 def _limit_reader(key: str) -> Callable[[_Block, str], None]:
-    """Return a function that reads the text of AL or AH, and stores the limit under a key, in openAIP's form."""
+    """Return a function that reads the text of AL or AH and stores the limit under a key.
+
+    The limit is in openAIP's form.
+    """
 
     def read(block: _Block, text: str) -> None:
         """Store the limit under the key; store nothing for a text that means no limit, such as GND for AL.

@@ -1,4 +1,6 @@
-"""Read UAS geographical zones as published by European authorities: EUROCAE ED-269 JSON and ED-318 GeoJSON.
+"""Read UAS geographical zones as published by European authorities.
+
+The formats are EUROCAE ED-269 JSON and ED-318 GeoJSON.
 
 ED-269: features with a list of volumes, each a polygon or a circle between two limits.  ED-318: GeoJSON features whose
 geometries have a `layer`, and points an `extent`; its schema is public (https://github.com/UASGeoZones/ED-318).  Spain
@@ -58,7 +60,9 @@ def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
-    """Yield the location of each volume in an ED-269 file, and its [[zones]] entries or the reason to skip it.
+    """Yield the location of each volume in an ED-269 file, and its [[zones]] entries.
+
+    A skipped volume has the reason in place of the entries.
 
     A zone without a restriction is skipped.
 
@@ -105,7 +109,9 @@ def _feature_list(data: Mapping[str, Any]) -> Any:
 
 
 def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:
-    """Yield the location of each layer of an ED-318 feature, and its [[zones]] entries or the reason to skip it.
+    """Yield the location of each layer of an ED-318 feature, and its [[zones]] entries.
+
+    A skipped layer has the reason in place of the entries.
 
     location: location of the feature in the file, for messages.
     index: index of the feature, from 0.
@@ -206,7 +212,10 @@ def _parse_limit(value: Any, unit: Any, datum: Any, limit_name: str, source: str
 
 
 def _parse_rings(coordinates: Any, source: str) -> list[list[list[float]]]:
-    """Convert a polygon's coordinates to rings of [latitude, longitude]. Raises ScenarioError for invalid values."""
+    """Convert a polygon's coordinates to rings of [latitude, longitude].
+
+    Raises ScenarioError for invalid values.
+    """
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
@@ -248,7 +257,9 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone is active, as texts of a [[zones]] table; empty for an always active zone.
+    """Return the periods in which a zone is active, as texts of a [[zones]] table.
+
+    The result is empty for a zone that is always active.
 
     applicability: value of the file, a list of periods with schedules; None for always.
     """

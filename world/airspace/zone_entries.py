@@ -57,7 +57,9 @@ _FAA_NOT_APPLICABLE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert a zone's properties to the entries of a [[zones]] table; a zone without a kind is an exclusion.
+    """Convert a zone's properties to the entries of a [[zones]] table.
+
+    A zone without a kind is an exclusion.
 
     A limit that is a flight level or a height above the ellipsoid becomes an altitude. Its error enlarges the
     exclusion: `FLIGHT_LEVEL_ERROR` for a flight level, and the range of geoid heights for the ellipsoid.
@@ -97,7 +99,9 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert the limits of an authority's zone as `zone_entries` does, mark them as `PUBLISHED`, and correct them.
+    """Convert the limits of an authority's zone as `zone_entries` does, and correct them.
+
+    The entries are marked as `PUBLISHED`.
 
     Limits that leave no vertical band are corrected:
     - A lower limit above the upper limit (both AMSL, or both above ground) is swapped with it; mark `UPSIDE_DOWN`.

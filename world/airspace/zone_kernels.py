@@ -1,4 +1,6 @@
-"""Compute distances of positions and segments from zones in compiled code, exactly for straight edges and circles.
+"""Compute distances of positions and segments from zones in compiled code.
+
+The distances are exact for straight edges and circles.
 
 Zones are records, and the edges of all polygons are records of one array, so that kernels read zones sequentially.
 """
@@ -97,7 +99,10 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
 
 
 def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float, bool]:
-    """Return (height in m, is above ground) of a floor or ceiling; without a level, (default height, False)."""
+    """Return (height in m, is above ground) of a floor or ceiling.
+
+    Without a level, return (default height, False).
+    """
     return (default_height, False) if level is None else (level.height, level.datum == "ground")
 
 
@@ -164,7 +169,10 @@ def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tup
 
 @compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:
-    """Return the horizontal distance from a position (east, north, m) to the outline of zone z, m; negative inside."""
+    """Return the horizontal distance from a position to the outline of zone z, m; negative inside.
+
+    The position is east and north, m.
+    """
     distance, _ = nearest_edge(records, z, east, north)
     return distance
 
@@ -191,7 +199,9 @@ def height_outside_band(zone: Record, up: float, ground: float) -> float:
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the fraction of the segment a-b that is inside zone z on the map, within a part of the segment.
+    """Return the fraction of the segment a-b that is inside zone z on the map.
+
+    Only a part of the segment is examined.
 
     ax, ay, bx, by: ends of the segment, east and north, m.
     begin_fraction, end_fraction: limits of the part, as fractions of the segment; 0 and 1 for the whole segment.
@@ -236,7 +246,9 @@ def inside_fraction(
 
 @inlined
 def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
-    """Return the squared distance from an edge's first corner to a segment, m^2, and the segment's nearest point.
+    """Return the squared distance from an edge's first corner to a segment, m^2.
+
+    Also return the segment's nearest point.
 
     ax, ay: start of the segment, east and north, m.
     dx, dy: vector of the segment, m.

@@ -114,7 +114,10 @@ def parse_time(text: str) -> datetime:
 
 
 def _parse_part(text: str) -> datetime:
-    """Parse a time that is a part of a longer text; unlike `parse_time`, name this part in the error message."""
+    """Parse a time that is a part of a longer text.
+
+    Unlike `parse_time`, it names this part in the error message.
+    """
     try:
         return parse_time(text)
     except ValueError as error:

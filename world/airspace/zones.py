@@ -173,7 +173,9 @@ def is_hole(ring: Ring) -> bool:
 
 
 def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
-    """Return the outline of a band of constant width along a line, with semicircular ends: (east, north) m.
+    """Return the outline of a band of constant width along a line: (east, north) m.
+
+    The ends are semicircular.
 
     corners: corners of the line, (east, north) m.
     width: m.
@@ -271,7 +273,9 @@ def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
 
 
 def are_holes_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
-    """Return True if all holes are inside the outline, or if a ring is invalid, which `make_polygon` reports.
+    """Return True if all holes are inside the outline.
+
+    Also return True if a ring is invalid, which `make_polygon` reports.
 
     rings: the outline first, then its holes.
 

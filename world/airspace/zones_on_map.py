@@ -1,4 +1,7 @@
-"""Convert the zones of a scenario file to its map, check start and destination, and make outlines to draw."""
+"""Convert the zones of a scenario file to its map, and make outlines to draw.
+
+Start and destination are checked against the zones.
+"""
 
 import math
 from collections.abc import Sequence
@@ -123,7 +126,9 @@ _DEGREE_LENGTH_M = 111_000.0
 
 
 def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return the zones of a file that a flight in an area can meet: all inclusions, and the exclusions nearby.
+    """Return the zones of a file that a flight in an area can meet.
+
+    These are all inclusions, and the exclusions nearby.
 
     source: name of the file in messages.
     bounds: [[west, east], [south, north]] of the area, (2, 2) m.
@@ -253,7 +258,9 @@ def zone_rings(zone: Zone) -> tuple[Floats, ...]:
 
 
 def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
-    """Return the separate parts of a zone, each as (outline, *holes), with rings as `zone_rings` returns them.
+    """Return the separate parts of a zone, each as (outline, *holes).
+
+    The rings are as `zone_rings` returns them.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> [len(part) for part in zone_parts(zone)]

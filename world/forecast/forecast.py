@@ -166,7 +166,10 @@ class ForecastFacts:
 
     @property
     def is_old(self) -> bool:
-        """True if the forecast is older than `OLD_AGE` at the departure; False if the time of issue is unknown."""
+        """True if the forecast is older than `OLD_AGE` at the departure.
+
+        False if the time of issue is unknown.
+        """
         return self.age is not None and self.age > OLD_AGE
 
     def describe(self) -> str:

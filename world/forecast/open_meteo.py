@@ -1,4 +1,7 @@
-"""Read a forecast in the JSON of Open-Meteo's API: hourly winds at heights above ground and on pressure levels."""
+"""Read a forecast in the JSON of Open-Meteo's API.
+
+It has hourly winds at heights above ground and on pressure levels.
+"""
 
 import re
 from collections.abc import Mapping

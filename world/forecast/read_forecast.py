@@ -275,7 +275,9 @@ class _ForecastReader:
         return latitude.values.reshape(-1)[rows].astype(np.float64), wrapped_longitudes[columns].astype(np.float64)
 
     def _node_indices(self, latitude: Any, longitude: Any) -> tuple[Any, Any]:
-        """Return the indices of the rows and columns of nodes around the box, by ascending latitude and longitude.
+        """Return the indices of the rows and columns of nodes around the box.
+
+        They are in order of ascending latitude and longitude.
 
         latitude, longitude: coordinates of the file's regular grid.
 
@@ -334,7 +336,10 @@ class _ForecastReader:
         return None
 
     def _height_factor(self, array: Any) -> float:
-        """Return the factor that converts a height or a geopotential to m. Raises ForecastError for other units."""
+        """Return the factor that converts a height or a geopotential to m.
+
+        Raises ForecastError for other units.
+        """
         units = array.attrs.get("units")
         factor = unit_factor(units, HEIGHT_UNITS)
         if factor is None and str(units).replace(" ", "") in GEOPOTENTIAL_UNITS:
@@ -557,7 +562,9 @@ def _time_coordinates(array: Any) -> dict[str, Any]:
 
 
 def _is_component(name: Any, array: Any, pattern: re.Pattern[str], standard_names: tuple[str, ...]) -> bool:
-    """Return True if a variable is a component of the wind, by its CF standard name or else by its own name.
+    """Return True if a variable is a component of the wind.
+
+    The CF standard name decides, or else the variable's own name.
 
     pattern: names of the component in files without standard names.
     standard_names: standard names of the component.
@@ -573,7 +580,9 @@ def _is_height(name: Any, array: Any) -> bool:
 
 
 def _partner_key(name: str, letter: str) -> str:
-    """Return the name of a wind component without its axis, so that both components of a wind have the same key.
+    """Return the name of a wind component without its axis.
+
+    Both components of a wind have the same key.
 
     letter: letter of the axis, "u" or "v".
 

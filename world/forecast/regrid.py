@@ -8,14 +8,19 @@ from world.arrays import Floats, Ints
 
 
 def _near_longitudes(longitudes: Floats, west: float, east: float) -> Floats:
-    """Return longitudes (deg) shifted by whole turns to within 180 degrees of the mean of ``west`` and ``east``."""
+    """Return longitudes (deg) shifted by whole turns to within 180 degrees of a mean.
+
+    The mean is that of ``west`` and ``east``.
+    """
     center = 0.5 * (west + east)
     wrapped_longitudes: Floats = center + (longitudes.astype(np.float64) - center + 180.0) % 360.0 - 180.0
     return wrapped_longitudes
 
 
 def regular_axes(latitudes: Floats, longitudes: Floats, box: Any) -> tuple[Floats, Floats] | None:
-    """Return the latitudes and longitudes (deg) of a regular grid around a box, with the spacing of a given grid.
+    """Return latitudes and longitudes (deg) of a regular grid around a box.
+
+    The grid has the spacing of a given grid.
 
     latitudes, longitudes: nodes of the given grid, (r, c) deg.
     box: `world.forecast.forecast.Box`.

@@ -52,7 +52,9 @@ _SPELLINGS = {
 
 
 def unit_factor(units: object, factors: Mapping[str, float]) -> float | None:
-    """Return the factor from a unit, in any known spelling, to the unit with the factor 1; None for other units.
+    """Return the factor from a unit, in any known spelling, to the unit with the factor 1.
+
+    Return None for other units.
 
     factors: factors by unit, such as `SPEED_UNITS`.
 

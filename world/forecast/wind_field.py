@@ -111,7 +111,7 @@ class WindField:
         return self.interpolate(seconds, latitudes, longitudes, altitudes)[:, :2]
 
     def between(self, start: float, end: float) -> "WindField":
-        """Return the field with only the times that are needed to interpolate the wind from `start` to `end` (s)."""
+        """Return the field with only the times needed to interpolate the wind from `start` to `end` (s)."""
         times: Sequence[float] = self.times.tolist()
         first = max(0, bisect.bisect_right(times, start) - 1)
         last = min(len(times), bisect.bisect_left(times, end) + 1)
@@ -146,7 +146,9 @@ def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, 
 def _interpolate_level_value(
     field: Floats, corner: int, steps: tuple[int, int, int], fractions: tuple[float, float, float], number: int
 ) -> float:
-    """Interpolate a level's altitude or wind component linearly in time, latitude and longitude, between eight nodes.
+    """Interpolate a level's altitude or wind component between eight nodes.
+
+    The interpolation is linear in time, latitude and longitude.
 
     field: numbers of a packed field.
     corner: index in ``field`` of the first node of the cell, on this level.
@@ -171,7 +173,9 @@ def _interpolate_level_value(
 def interpolate_field(
     field: Floats, seconds: float, latitude: float, longitude: float, altitude: float
 ) -> tuple[float, float, float]:
-    """Return the wind at a point of a packed field, m/s, east and north, and the altitude at which it applies, m AMSL.
+    """Return the wind at a point of a packed field, m/s, east and north, and its altitude.
+
+    The altitude is that at which the wind applies, m AMSL.
 
     The resulting altitude is the point's altitude, limited to the levels there.
 
@@ -230,7 +234,9 @@ def interpolate_field(
 def _interpolate_points(
     field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
 ) -> Floats:
-    """Return the wind at n points by `interpolate_field`, (n, 3): east and north, m/s, and the altitude, m AMSL.
+    """Return the wind at n points by `interpolate_field`, (n, 3).
+
+    The columns are east and north, m/s, and the altitude, m AMSL.
 
     The altitude is the one to which the wind applies: the point's altitude, limited to the levels of the field.
     """
@@ -268,7 +274,10 @@ class MeanProfile:
     gradient: float
 
     def velocities_at(self, heights: Floats) -> Floats:
-        """Return the wind, m/s, at heights above the reference altitude (m); a new last axis has east and north."""
+        """Return the wind, m/s, at heights above the reference altitude (m).
+
+        A new last axis has east and north.
+        """
         speeds = self.speed + self.gradient * heights
         return np.stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)], axis=-1)
 
