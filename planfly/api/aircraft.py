@@ -155,7 +155,7 @@ def new_aircraft(
 def describe_aircraft(
     name: str | Path, *, motor_braking: bool = False, out: str | Path | None = None, overwrite: bool = False
 ) -> AircraftNumbers:
-    """Compute trims, modes, envelope and step responses of an aircraft, and draw them if a folder is named.
+    """Compute trims, modes, envelope and step responses of an aircraft; draw them if a folder is named.
 
     name: name of a built-in aircraft, or a folder.
     motor_braking: True to let the motor brake in descents.

@@ -93,7 +93,7 @@ def ground_risk(
 
 
 def _write_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:
-    """Write volumes, map, table and page of a result into a folder; return the result with the written files.
+    """Write volumes, map, table and page of a result into a folder; return the result with the files.
 
     command: command line that repeats the search, for the page; "" to show none.
     """

@@ -346,7 +346,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 def fly_energy_campaign(
     base: CampaignBase, goal: BatteryGoal, workers: Workers, mass_factor: float, advance: Advance
 ) -> tuple[EnergyRow, ...]:
-    """Fly the flights of a campaign, and return their rows with the used energies, in the order of the draws.
+    """Fly the flights of a campaign; return their rows with the used energies in the order of the draws.
 
     mass_factor: factor on the mass of the aircraft's model.
     advance: called after each flight with the number of flights done, their total and a text.

@@ -187,7 +187,7 @@ class WindowResult:
 def departure_times(
     first: datetime, last: datetime, step: timedelta, asked: datetime | None = None
 ) -> tuple[datetime, ...]:
-    """Return the departure times, ascending: every `step` from `first` up to `last`, and the requested time.
+    """Return departure times, ascending: every `step` from `first` up to `last`, and the requested time.
 
     asked: requested time of take-off; None if any departure will do.
 

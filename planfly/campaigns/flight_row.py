@@ -314,7 +314,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str, str], ...]:
-    """Return the rules that a verdict does not judge, each with a text that names the places and the reason.
+    """Return the rules not judged by a verdict, each with a text that names the places and the reason.
 
     Returns () if a rule failed.
     """

@@ -637,7 +637,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
 
 
 def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
-    """Return the JUnit suite of a search for winds: a test case for its answer, and one for each direction.
+    """Return the JUnit suite of a search for winds: a case for its answer, and one for each direction.
 
     name: mission of the search.
 
@@ -666,7 +666,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the table in its folder, and write its files; the table must not be locked.
+    """Summarise a campaign from the table in its folder; write its files; the table must be unlocked.
 
     command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.
