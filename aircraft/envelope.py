@@ -1,4 +1,7 @@
-"""Define the performance envelope of an aircraft: steady climb, descent, speed and power by airspeed and altitude."""
+"""Define the performance envelope of an aircraft.
+
+It gives steady climb, descent, speed and power by airspeed and altitude.
+"""
 
 import math
 from dataclasses import dataclass, field, replace

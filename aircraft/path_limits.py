@@ -101,7 +101,10 @@ class Limits:
         return float(climb), float(dive)
 
     def with_margin(self) -> "Limits":
-        """Return the limits with the envelope reduced by a margin for its uncertainty (`Envelope.with_margin`)."""
+        """Return the limits with the envelope reduced by a margin for its uncertainty.
+
+        The envelope is reduced by `Envelope.with_margin`.
+        """
         return replace(self, envelope=self.envelope.with_margin())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
@@ -222,7 +225,9 @@ def derate(
 
 
 def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
-    """Reduce climb and descent angles so that maximum climb and sink rates (m/s) are kept; inf for no limit.
+    """Reduce path angles so that maximum climb and sink rates (m/s) are kept.
+
+    A rate of inf is no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
     >>> slower = limit_rates(table, 5.0, math.inf)

@@ -1,4 +1,6 @@
-"""Estimate the drag and the power of a small aircraft from its size, with a prior calibrated on real aircraft.
+"""Estimate the drag and the power of a small aircraft from its size.
+
+The prior is calibrated on real aircraft.
 
 Power in level flight is D V / efficiency + avionics. Minimum drag depends on layout and aspect ratio, propulsive
 efficiency on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric

@@ -1,4 +1,6 @@
-"""Define the tracking error of an autopilot: its deviation from the legs, for which plans reserve margins.
+"""Define the tracking error of an autopilot.
+
+It is the deviation from the legs, for which plans reserve margins.
 
 The path of an autopilot at a corner, and the lag with which its altitude follows a slope, depend on its controllers and
 parameters; the module of each autopilot fills these tables. Compiled functions take the tables as one record.

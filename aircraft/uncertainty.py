@@ -1,4 +1,6 @@
-"""Read and write the uncertainty of an aircraft: factors of its model with standard deviations, and random draws.
+"""Read and write the uncertainty of an aircraft.
+
+It consists of factors of its model with standard deviations, and random draws.
 
 Next to the model there is ``uncertainty.toml`` (from a data sheet) or ``posterior.toml`` (from flight logs), and
 ``draws.csv``. A draw is a random sample of all uncertain properties, and one row of ``draws.csv``; the columns are the

@@ -1,1 +1,4 @@
-"""Path planner: encodings, constraints and objectives, preference, and estimation of distribution algorithms."""
+"""Path planner.
+
+It has encodings, constraints, objectives, preferences, and estimation of distribution algorithms.
+"""

@@ -1,4 +1,6 @@
-"""Represent a plan by its waypoints, scores, certificate, scenario and search settings; read and write its file.
+"""Represent a plan, and read and write its file.
+
+A plan has waypoints, scores, a certificate, a scenario and search settings.
 
 The file format is ``plan.json`` (schema planfly.plan/1): `plan_json` writes it, `read_plan` and `parse_plan` read it
 and check every field. `Certificate` is filled by `planner.evaluation.certify`.

@@ -1,4 +1,6 @@
-"""Represent a plan's departure from the ground and its approach to the ground, and convert both to JSON.
+"""Represent a plan's departure from the ground and its approach to the ground.
+
+Both can be converted to JSON.
 
 A plan's path stays in the air between start and destination.  If its scenario has `[launch]` or `[landing]`, the
 departure leads from home to the path and the approach from the path to the landing strip;
@@ -21,7 +23,9 @@ _Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClimbOut:
-    """Departure: launch at home, straight climb to the take-off altitude, and waypoints to the plan's start.
+    """Departure from home to the plan's start.
+
+    It has a launch, a straight climb to the take-off altitude, and waypoints.
 
     home: (3,) m, on the ground.
     course: launch course, rad clockwise from north.
@@ -43,7 +47,9 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent:
-    """Approach: waypoints from the plan's end to the line-up, which is a level leg, and a glide to the ground.
+    """Approach from the plan's end to the ground.
+
+    It has waypoints to the line-up, which is a level leg, and a glide.
 
     waypoints: (n, 3) m, before the line-up.
     final_waypoints: (2, 3) m, both ends of the line-up, at one altitude on the landing course; the glide begins at the

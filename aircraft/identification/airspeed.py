@@ -1,4 +1,6 @@
-"""Estimate the scale of the airspeed sensor from the wind triangle: ground velocity minus air velocity is the wind.
+"""Estimate the scale of the airspeed sensor from the wind triangle.
+
+Ground velocity minus air velocity is the wind.
 
 The wind does not depend on the aircraft's heading. If the sensor reads too little, a part of the airspeed appears as
 wind, and this part turns with the aircraft: every turn shows it. Wind and gusts also change, but slowly, so the change

@@ -1,4 +1,7 @@
-"""Define the initial model of an identification as numbers: mass, geometry, inertia, coefficients and motor."""
+"""Define the initial model of an identification as numbers.
+
+These are mass, geometry, inertia, coefficients and motor.
+"""
 
 from dataclasses import dataclass
 

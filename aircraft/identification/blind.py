@@ -1,4 +1,6 @@
-"""Predict parts of a log that no estimate has used, as bands of 95 %, and count how often the flight is inside.
+"""Predict parts of a log that no estimate has used, as bands of 95 %.
+
+The fraction of the flight inside the bands is counted.
 
 The judged part of the log is cut into windows. Each window starts from the measured state and follows the logged
 controls. Forty flights of each window are simulated. Each of them uses another draw of the aircraft. The prediction

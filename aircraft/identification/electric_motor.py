@@ -1,4 +1,6 @@
-"""Model an electric motor with a fixed propeller: thrust and current by airspeed, throttle and density.
+"""Model an electric motor with a fixed propeller.
+
+The model gives thrust and current by airspeed, throttle and density.
 
 Beard and McLain, Small Unmanned Aircraft, second edition, section 4.3: the motor's torque KQ ((V_in - KV w) / R - i0)
 equals the propeller's torque q2 w^2 + q1 w + q0. A motor that does not brake windmills at zero current.

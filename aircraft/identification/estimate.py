@@ -210,7 +210,7 @@ def score_predictions(
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """Return the sum of the covariance of the fits (n, n) and the covariance that results from the shifts (n,).
+    """Return the covariance of the fits (n, n) plus the covariance that results from the shifts (n,).
 
     For lift and drag, a variance is limited to the variance of the prior.
 
@@ -272,7 +272,9 @@ def fit_parameters(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, as if the quantities that are held fixed had no errors.
+    """Estimate all parameters from aligned signals.
+
+    The quantities that are held fixed are assumed to have no errors.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: levelling error of the autopilot (error of its pitch reference), rad.

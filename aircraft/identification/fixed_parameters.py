@@ -122,7 +122,7 @@ def _noise_doubling(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Cha
 
 
 def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that increases the lag of the servos, and shortens their delay by the same time, s."""
+    """Return a function that increases the servos' lag and shortens their delay by the same time, s."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         """Return the signals with the changed lag and delay of the surfaces, and the model."""

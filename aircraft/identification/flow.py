@@ -1,4 +1,6 @@
-"""Compute angle of attack and sideslip without vanes: from the accelerometers, or from attitude and velocity.
+"""Compute angle of attack and sideslip without vanes.
+
+They follow from the accelerometers, or from attitude and velocity.
 
 The lift divided by the slope of the lift curve is the angle of attack, gusts included; the side force gives the
 sideslip in the same way.  Attitude and velocity give the angle of attack in air without vertical motion, which is valid

@@ -1,4 +1,6 @@
-"""Estimate biases of the inertial sensors and the level error of the autopilot, from attitude and ground velocity.
+"""Estimate biases of the inertial sensors and the level error of the autopilot.
+
+They are estimated from attitude and ground velocity.
 
 The rates of the gyros must agree with the change of attitude, and the accelerometers with the change of ground velocity
 minus gravity. Mean differences are biases; in the forward direction a level error has the same effect as a bias.

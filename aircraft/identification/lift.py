@@ -1,4 +1,6 @@
-"""Fit the lift curve by reverse regression: of the angle of attack, computed from attitude, on the lift coefficient.
+"""Fit the lift curve by reverse regression.
+
+The angle of attack, computed from attitude, is regressed on the lift coefficient.
 
 At low frequencies an aircraft heaves with the gusts: its lift does not contain the gusts, but the angle of attack from
 attitude and velocity does. Therefore the lift is the regressor, without errors, and the angle of attack has the errors.

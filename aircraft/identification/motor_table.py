@@ -1,4 +1,6 @@
-"""Model a motor with its propeller by tables of thrust, battery power and torque, for an aircraft model of any form.
+"""Model a motor with its propeller by tables of thrust, battery power and torque.
+
+The tables fit an aircraft model of any form.
 
 The tables hold for one density and the nominal battery voltage. A motor that runs faster by a factor s at the same
 throttle and advance ratio V / (n D) has s squared times the thrust and torque, and s cubed times the power, at s times

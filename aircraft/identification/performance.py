@@ -1,4 +1,6 @@
-"""Compute the steady flight of many draws at once: climb at full throttle, sink at idle, power in cruise.
+"""Compute the steady flight of many draws at once.
+
+It covers climb at full throttle, sink at idle, and power in cruise.
 
 The formulas are for a point mass with a trimmed elevator. JSBSim's trims (`flight.dynamics.trim`) are the reference,
 and tests compare the two.

@@ -1,4 +1,6 @@
-"""Model a propeller as a disc that accelerates the air: thrust and current by airspeed, throttle and density.
+"""Model a propeller as a disc that accelerates the air.
+
+The model gives thrust and current by airspeed, throttle and density.
 
 Beard and McLain, Small Unmanned Aircraft, first edition, section 4.3; the throttle sets the speed of the air behind the
 disc. Published models of flying wings have this form.

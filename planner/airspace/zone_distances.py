@@ -1,4 +1,6 @@
-"""Measure how deep legs penetrate zones, for the search, and how far a path is from zones, for the certificate.
+"""Measure how legs penetrate zones, and how far a path is from zones.
+
+The search uses the depths, and the certificate the distances.
 
 The search penalises a leg by the depth of its penetration times its length, computed from the zone's extent across and
 along the leg; for zone limits above ground the terrain is sampled. The certificate cuts the path near a zone into
@@ -110,7 +112,7 @@ def zone_penetration(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z with its margin, and the part of the line next to the zone.
+    """Return the depth of a line in exclusion z with its margin, and the part of the line next to it.
 
     required_distance: required distance from the zone, m.
 

@@ -1,4 +1,6 @@
-"""Represent zones as arrays for compiled code, with their margins, and measure distances of lines from shapes.
+"""Represent zones and their margins as arrays for compiled code.
+
+Also measure distances of lines from shapes.
 
 Each zone has a horizontal and a vertical margin. A fixed end that violates a margin reduces it for its zone. Exclusions
 are sorted from west to east, so that a kernel visits only those near a leg. Distances are computed in the axes of the

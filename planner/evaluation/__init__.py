@@ -1,1 +1,4 @@
-"""Evaluation of a candidate path: its encoding, the problem as arrays, the scores, and the certificate."""
+"""Evaluation of a candidate path.
+
+It has the encoding, the problem as arrays, the scores, and the certificate.
+"""

@@ -1,4 +1,6 @@
-"""Measure zones and the maximum height above ground: violations for the search, margins for the certificate.
+"""Measure zones and the maximum height above ground.
+
+The search uses violations, and the certificate margins.
 
 A search adds two amounts to a path's scores, both in m·km: the depth of its legs in zones (to bounds), and their height
 above the maximum height above ground (to terrain). The paper's scores count pieces of legs instead. Each leg is first

@@ -1,4 +1,6 @@
-"""Measure a path for its certificate: pieces of the path, their clearance and their distance to missiles.
+"""Measure a path for its certificate.
+
+Measured are pieces of the path, their clearance and their distance to missiles.
 
 A path is cut into straight pieces. Without tracking error these are its legs and the chords of its fly-by arcs. With it
 they are parts of legs and corners, each with bounds on how far the flight deviates from it sideways, below and above;

@@ -1,4 +1,6 @@
-"""Check the constraints on waypoints and legs that all scores share: turns and their lengths, slopes, map bounds.
+"""Check the constraints on waypoints and legs that all scores share.
+
+These are turns and their lengths, slopes, and map bounds.
 
 The first part holds the scratch with which the paper's scores evaluate blocks of paths side by side. The second part
 derives limits that hold for all paths of a problem (`PrecomputedLimits`) and adds the violations of one path, as counts

@@ -1,4 +1,6 @@
-"""Represent a scenario and its limits as a planning problem of arrays for compiled code and a search space.
+"""Represent a scenario and its limits as a planning problem.
+
+It has arrays for compiled code and a search space.
 
 `make_problem` makes two sets of arrays. `certified` has the margins that a certificate requires, which cover the errors
 of a flight. `search` has larger margins, which also cover what lies between the samples of the search. Near fixed ends
@@ -141,7 +143,10 @@ def threat_records(threats: Threats) -> Records:
 
 
 def sphere_records(threats: Records) -> Records:
-    """Convert `THREAT` records to `SPHERE` records (m,), with squared radii and fourth powers of the scales."""
+    """Convert `THREAT` records to `SPHERE` records (m,).
+
+    The radii are squared, and the scales have their fourth powers.
+    """
     spheres = np.zeros(len(threats), dtype=SPHERE)
     for name in ("east", "north", "up"):
         spheres[name] = threats[name]
@@ -511,7 +516,9 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
-    """Reduce the area and the range of altitudes of the arrays by margins, but keep both fixed ends inside.
+    """Reduce the arrays' area and range of altitudes by margins.
+
+    Both fixed ends stay inside.
 
     lateral: margin to the edges of the map, m.
     height: margin to floor and ceiling, m.

@@ -1,4 +1,6 @@
-"""Measure the clearance of legs: depth below the required clearance, and smallest heights near waypoints.
+"""Measure the clearance of legs.
+
+Measured are the depth below the required clearance, and the smallest heights near waypoints.
 
 Height is sampled along a leg. The steps grow with the height above the required clearance, because the ground cannot
 rise faster than its steepest slope nearby; near the ground they are the sample spacing. An autopilot that follows the

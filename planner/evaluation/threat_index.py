@@ -1,4 +1,6 @@
-"""Spatial indexes of threats: by grid cell for points, and by position of the missiles for line segments.
+"""Spatial indexes of threats.
+
+Points are looked up by grid cell, and line segments by position of the missiles.
 
 `ThreatCells` lists for each cell of a grid the units (numbers of threats) whose spheres reach it; the paper's scores
 look up points in it. `MissileIndex` stores missiles in the order of grid cells, one grid per class of similar radii;

@@ -1,4 +1,6 @@
-"""Estimation of distribution for several objectives: a mixture with one component around each solution of the front.
+"""Estimation of distribution for several objectives.
+
+The distribution is a mixture with one component around each solution of the front.
 
 Thierens and Bosman ("Multi-objective mixture-based iterated density estimation evolutionary algorithms", GECCO 2001)
 spread a mixture along the front by clusters. Here every solution of the archive is the mean of a component, and a

@@ -1,4 +1,6 @@
-"""Estimation of distribution algorithm with a Markov chain: each group of variables depends on the previous group.
+"""Estimation of distribution algorithm with a Markov chain.
+
+Each group of variables depends on the previous group.
 
 The dependence is linear with Gaussian residuals. A waypoint passes an obstacle on the same side as the waypoint before
 it. Independent marginals lose this dependence; a chain keeps it with far fewer parameters than a full covariance, so

@@ -1,4 +1,6 @@
-"""Run many searches with one Gaussian each, from starts of many widths and places; only promising ones continue.
+"""Run many searches with one Gaussian each, from starts of many widths and places.
+
+Only promising searches continue.
 
 A single Gaussian follows one valley.  If a narrow gap leads to a better valley, a wider Gaussian does not find the gap,
 but a start as wide as the gap does.  The width of the gap is unknown, so that starts are drawn with widths of all

@@ -1,4 +1,6 @@
-"""Sampling with niches: many groups of variables, each with a mixture of Gaussians around its best samples.
+"""Sampling with niches: many groups of variables.
+
+Each group has a mixture of Gaussians around its best samples.
 
 `planner.optimisers.umda` fits one Gaussian to each variable. Here the density of a group is a sum of Gaussians around
 its selected samples (Bosman and Thierens, "IDEAs based on the normal kernels probability density function", Utrecht
@@ -157,7 +159,9 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample differs from each other sample by the clearing radius or more in some variable.
+    """Return True if a sample differs from each other sample by the clearing radius or more.
+
+    A difference in one variable suffices.
 
     row: (d,) the sample.
     other_rows: (n, d) the other samples.

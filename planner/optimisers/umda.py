@@ -1,4 +1,6 @@
-"""UMDAc: univariate marginal distribution algorithm for continuous variables, with an ask-and-tell interface.
+"""UMDAc: univariate marginal distribution algorithm for continuous variables.
+
+It has an ask-and-tell interface.
 
 Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002; section IV of Yang, Tang and Lozano, CEC
 2014.

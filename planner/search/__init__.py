@@ -1,1 +1,4 @@
-"""Whole searches: from a scenario to a certified plan, replanning in flight, and explanations of failures."""
+"""Whole searches: from a scenario to a certified plan.
+
+Replanning in flight and explanations of failures are included.
+"""

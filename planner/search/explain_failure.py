@@ -1,4 +1,6 @@
-"""Explain why a search found no feasible path, by obstacles that block all routes and limits of the method.
+"""Explain why a search found no feasible path.
+
+Reasons are obstacles that block all routes, and limits of the method.
 
 `explain_failure` collects lines for the user. It looks for lines across the map on which the ground plus clearance
 reaches the ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on

@@ -270,7 +270,9 @@ def may_try_again(search: Search) -> bool:
 
 
 def _count_attempt_legs(search: Search) -> int:
-    """Return the number of legs between candidates of neighbouring intervals that a first attempt evaluates.
+    """Return the number of legs between neighbouring intervals that a first attempt evaluates.
+
+    The legs join candidates of these intervals.
 
     The legs of all generations are counted, without the savings of a bound on the cost.
     """
@@ -284,7 +286,10 @@ def _count_attempt_legs(search: Search) -> int:
 
 
 def _as_vectors(rows: Floats) -> Floats:
-    """Convert k candidates per interval, (i, k, 3), to k vectors with one candidate per interval, (k, 3 i)."""
+    """Convert k candidates per interval, (i, k, 3), to k vectors, (k, 3 i).
+
+    Each vector has one candidate per interval.
+    """
     return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
 
 

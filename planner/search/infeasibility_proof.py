@@ -63,7 +63,9 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_waypoint(data: ProblemArrays) -> float:
-    """Return the highest altitude that a waypoint may have, m; inf if `highest_level_flight` finds no limit.
+    """Return the highest altitude that a waypoint may have, m.
+
+    It is inf if `highest_level_flight` finds no limit.
 
     The leg to the highest waypoint is level or climbs, unless this waypoint is the start. Therefore the highest
     waypoint is not above the start, or the aircraft can climb there at least as steeply as the margin to the slope

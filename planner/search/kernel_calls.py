@@ -1,4 +1,7 @@
-"""Call the planner's kernels on small problems with the argument types of a search, to compile them ahead of use."""
+"""Call the planner's kernels on small problems, to compile them ahead of use.
+
+The argument types are those of a search.
+"""
 
 import numpy as np
 

@@ -1,4 +1,6 @@
-"""Lay out a plan's departure from home to its first waypoint, and its approach from the last waypoint to the strip.
+"""Lay out a plan's departure and approach.
+
+They lead from home to the first waypoint, and from the last waypoint to the strip.
 
 Both are searched among a few thousand paths of straight legs, shortest first. A path consists of a launch course or a
 final, and of corners and laps between it and the plan. A path is accepted if it passes the plan's certificate (turns,
@@ -331,7 +333,9 @@ def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
 
 
 def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances along a course, m, and the terrain altitude at each of them, m AMSL; NaN if unknown.
+    """Return distances along a course, m, and the terrain altitudes there, m AMSL.
+
+    Unknown altitudes are NaN.
 
     start: east and north of the first point, m.
     course: rad.

@@ -306,7 +306,10 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce a task's margins until the default path (w, 3) keeps them, so that other paths may be as tight."""
+    """Reduce a task's margins until the default path (w, 3) keeps them.
+
+    Other paths may then be as tight.
+    """
     for fraction in MARGIN_FRACTIONS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():

@@ -159,7 +159,9 @@ def plan_path(
 
 
 def _needs_other_count(best: _Result, count: int) -> bool:
-    """Return True if a search with another number of waypoints may find a better path than the best so far.
+    """Return True if a search with another number of waypoints may find a better path.
+
+    The path is compared with the best path so far.
 
     best: the best result so far.
     count: the other number of waypoints.

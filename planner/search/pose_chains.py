@@ -48,7 +48,9 @@ MAX_LAPS = 8
 def candidate_chains(
     start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[MapPoint]]:
-    """Yield candidates for a path from `start` to `end`, as lists of corners, for a departure or an approach.
+    """Yield candidates for a path from `start` to `end`, as lists of corners.
+
+    The path is a departure or an approach.
 
     course, end_course: course of the leg before `start`, and of the leg after `end`, rad.
     turn_radius: radius of the tightest turn, m.

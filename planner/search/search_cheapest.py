@@ -1,4 +1,6 @@
-"""Search for the path with the minimum time or energy, if a scenario requires it instead of the shortest path.
+"""Search for the path with the minimum time or energy.
+
+It is used if a scenario requires this path instead of the shortest path.
 
 The search for the shortest path comes first, with its certificate. From that path, from the straight line and from
 routes on other sides of the obstacles, all waypoints then move at once so that the path costs less under the same

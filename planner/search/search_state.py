@@ -1,4 +1,6 @@
-"""Hold the state of a search, with its scores, archive of the best paths, evaluation budget and stop condition.
+"""Hold the state of a search.
+
+It has scores, an archive of the best paths, an evaluation budget and a stop condition.
 
 `Search` is the interface that seeding and generations share. It scores paths, keeps the best in an `Archive`, counts
 evaluations against the budget, applies local searches, and decides when the search is finished.
@@ -59,7 +61,10 @@ def are_violated(scores: Floats) -> Flags:
 
 
 def are_safe(scores: Floats) -> Flags:
-    """Return a mask (...,) of the paths whose scores (..., 8) show no violation and no exposure to missiles."""
+    """Return a mask (...,) of the paths without violation and without exposure to missiles.
+
+    The scores have the shape (..., 8).
+    """
     return np.asarray(~are_violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
@@ -486,7 +491,9 @@ class Search:
             self.progress(self.done, self.done, f"{ratio:.4f} times the straight line, kill exposure 0")
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """Return the best path in the archive that is certified with the full kill margin, and its certificate.
+        """Return the best certified path in the archive, and its certificate.
+
+        The certificate has the full kill margin.
 
         Without such a path, return the certified path furthest from missiles, or the best path if none is certified. A
         search that is asked to stop examines only the first few paths.

@@ -1,4 +1,6 @@
-"""Find starting points of a seeded search: the straight line, grid routes, other sides, and routes that turn back.
+"""Find starting points of a seeded search.
+
+These are the straight line, grid routes, other sides, and routes that turn back.
 
 Waypoints are fitted to one grid route after another, and the paths are improved; the best becomes the seed of the
 population. A grid estimates the length of a route past an obstacle only as well as it resolves gaps. Grids with reduced

@@ -49,7 +49,10 @@ class SharedBudget:
         return sum(plan.evaluations for plan in self._plans)
 
     def _record_plan(self, plan: Plan) -> Plan:
-        """Store a plan and return it; if all earlier searches completed, also store why the search for it ended."""
+        """Store a plan and return it.
+
+        If all earlier searches completed, also store why the search for it ended.
+        """
         self._plans.append(plan)
         if self._end_reason == "completed":
             self._end_reason = plan.ended

@@ -1,4 +1,6 @@
-"""Find cheapest routes over grids among zones and below a maximum height above ground, in the rotated frame.
+"""Find cheapest routes over grids among zones and below a maximum height above ground.
+
+The grids are in the rotated frame.
 
 Dynamic programming over forward steps as in `planner.seeding.grids`, with two differences. If there is a maximum height
 above ground, the layers follow the terrain. Each step as a whole is tested against the zones, because an obstacle

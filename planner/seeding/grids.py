@@ -1,4 +1,6 @@
-"""Find cheapest routes over coarse grids through terrain and threats in the rotated frame, stage by stage.
+"""Find cheapest routes over coarse grids through terrain and threats, stage by stage.
+
+The grids are in the rotated frame.
 
 A grid decides on which side to pass each obstacle; `planner.seeding.waypoint_fitting` then places the path's waypoints,
 one per interval, by evaluating whole legs. Both use dynamic programming over forward steps, because a path in the

@@ -1,4 +1,6 @@
-"""Find routes that may turn back or circle to climb, by A* over a lattice of positions, heights and eight courses.
+"""Find routes that may turn back or circle to climb.
+
+They are found by A* over a lattice of positions, heights and eight courses.
 
 A* search (Hart, Nilsson and Raphael, 1968) over states; a state is a lattice point and one of eight courses. A step
 leads to a neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a
@@ -240,7 +242,10 @@ GUIDED_WEIGHT = 1.5
 
 @compiled
 def _straight_distances(frame: RotatedFrame, lattice: Lattice) -> Floats:
-    """Return the squared straight distance from each column of a lattice to the goal, (along x across,) m2."""
+    """Return the squared straight distance from each column of a lattice to the goal, m2.
+
+    The shape is (along x across,).
+    """
     squared_distances, point, goal = np.empty(lattice.along * lattice.across), np.empty(3), np.empty(3)
     _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
     for position in range(squared_distances.size):

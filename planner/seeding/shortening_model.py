@@ -1,4 +1,6 @@
-"""Compute the augmented Lagrangian of a path's length, with gradient and Hessian, for `planner.seeding.shortening`.
+"""Compute the augmented Lagrangian of a path's length, with gradient and Hessian.
+
+It is used by `planner.seeding.shortening`.
 
 The method of multipliers of Hestenes and Powell, in the form for inequalities of Rockafellar ("The multiplier method of
 Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
@@ -373,7 +375,9 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Add the distances between legs and missiles to the model; return their contribution to the Lagrangian.
+    """Add the distances between legs and missiles to the model.
+
+    Return their contribution to the Lagrangian.
 
     path: (w, 3) m.
     multipliers: (c,) multipliers of all constraints.
@@ -619,7 +623,9 @@ def _add_turns(
 
 @inner
 def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
-    """Add a multiple of a turn's derivatives by its three waypoints to `slopes` (3, 3), one row per waypoint.
+    """Add a multiple of a turn's derivatives by its three waypoints to `slopes`.
+
+    `slopes` has the shape (3, 3), one row per waypoint.
 
     before_derivatives, after_derivatives: derivatives of the turn with respect to the vectors of the legs before and
         after it, (2,): east and north.

@@ -1,4 +1,6 @@
-"""Find routes that pass obstacles on other sides than the cheapest route does, one per choice of sides.
+"""Find routes that pass obstacles on other sides than the cheapest route.
+
+There is one route per choice of sides.
 
 Two passes of dynamic programming run over the same grid, one from the start and one from the destination. The sum of
 their costs in a cell is the cost of the cheapest route through this cell. The smallest sum to the left of an obstacle

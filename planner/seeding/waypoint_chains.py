@@ -271,7 +271,9 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path; 0 for other turns.
+    """Return the cost of a turn that is too sharp, or whose legs are too short, m of path.
+
+    It is 0 for other turns.
 
     previous_waypoint, waypoint, next_waypoint: (3,) m.
     corners: working memory, one `CORNER` record.

@@ -1,4 +1,6 @@
-"""Fit waypoints to a route by dynamic programming over candidate points, with evaluation of whole legs.
+"""Fit waypoints to a route by dynamic programming over candidate points.
+
+Whole legs are evaluated.
 
 `fit_points` chooses one candidate per interval so that the sum of leg costs is smallest, then repeats this with
 candidates around each chosen waypoint and shrinking moves. `move_all_waypoints` applies the same moves to a path of the
@@ -119,7 +121,7 @@ def _max_depth_below_leg(
 
 @compiled
 def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
-    """Choose one of the candidates (w, c, 3) of each waypoint, so that the sum of the leg costs is smallest.
+    """Choose a candidate (w, c, 3) for each waypoint, so that the sum of the leg costs is smallest.
 
     Dynamic programming, waypoint by waypoint: of all paths to a candidate only the cheapest is kept. The first
     candidates of both ends are used.
