@@ -666,7 +666,9 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the table in its folder; write its files; the table must be unlocked.
+    """Summarise a campaign from the table in its folder, and write its files.
+
+    The table must not be locked.
 
     command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.
