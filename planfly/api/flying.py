@@ -83,7 +83,10 @@ class Judged:
 
     @property
     def returns_line(self) -> str:
-        """One line on returns to launch from a few points of the flight or the planned path; "" without a home."""
+        """One line on returns to launch from a few points of the flight or the planned path.
+
+        It is "" without a home.
+        """
         return self.return_summary.line
 
     @property

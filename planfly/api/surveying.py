@@ -271,7 +271,9 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 
 
 def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool) -> SurveyResult:
-    """Write the picture of the photo lines and the files of the remedies; return the result with these files.
+    """Write the picture of the photo lines and the files of the remedies.
+
+    Return the result with these files.
 
     out: folder; None to write nothing.
     """

@@ -169,7 +169,9 @@ class CampaignResult:
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """Return the goal of a campaign from the keyword arguments of `planfly.campaign`; None stands for a default.
+    """Return the goal of a campaign from the keyword arguments of `planfly.campaign`.
+
+    The value None stands for a default.
 
     Raises ArgumentError for numbers outside their ranges, and if both `prove` and `at_least` are given.
 

@@ -113,7 +113,9 @@ class ExcursionRow(FlightRow):
 def fly_for_excursions(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
 ) -> ExcursionRow:
-    """Fly one flight of a campaign and its returns; return its row with the area below them and the area of falls.
+    """Fly one flight of a campaign and its returns.
+
+    Return its row with the area below them and the area of falls.
 
     index: number of the flight, from 0.
     wind: mean wind that replaces the scenario's wind; None for the scenario's wind.
@@ -580,5 +582,8 @@ def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGe
 
 
 def _distance_beyond(outer: BaseGeometry, inner: BaseGeometry) -> float:
-    """Return the largest distance from the outline of an outer area to an inner area, m; 0 for an empty outer area."""
+    """Return the largest distance from the outline of an outer area to an inner area, m.
+
+    Return 0 for an empty outer area.
+    """
     return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max(initial=0.0))

@@ -371,7 +371,9 @@ class _Search:
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
     def next_round(self) -> list[RequestedFlight]:
-        """Close the directions that need no more flights; return the requests of the next round for the others.
+        """Close the directions that need no more flights.
+
+        Return the requests of the next round for the others.
 
         The list is empty if all directions are closed, or if `goal.flights` flights were flown.
         """

@@ -244,7 +244,10 @@ class FlightRow:
 
     @property
     def closeness(self) -> float:
-        """Smallest ratio of a margin to the scale of its rule, by which flights are sorted; inf if none is known."""
+        """Smallest ratio of a margin to the scale of its rule, by which flights are sorted.
+
+        It is inf if none is known.
+        """
         fractions = (fraction for rule, margin in self.margins if (fraction := scale_margin(rule, margin)) is not None)
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 

@@ -128,7 +128,9 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the fan of clearances along the path and the crossings of waypoints; return each figure and its title.
+    """Draw the fan of clearances along the path and the crossings of waypoints.
+
+    Return each figure and its title.
 
     Return [] if no flight has path data.  There is no fan without terrain.
     """
@@ -470,7 +472,10 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _unjudged_lines(winds: WindsResult) -> list[str]:
-    """Return lines on the directions of a search that are not judged, and on the reasons; [] if all are judged."""
+    """Return lines on the directions of a search that are not judged, and on the reasons.
+
+    Return [] if all are judged.
+    """
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
@@ -537,7 +542,10 @@ def _flown_bound_lines(winds: WindsResult) -> list[str]:
 
 
 def _boundary_lines(winds: WindsResult) -> list[str]:
-    """Return a list with one line on the lowest and the highest boundary of a search; [] if no boundary is stated."""
+    """Return a list with one line on the lowest and the highest boundary of a search.
+
+    Return [] if no boundary is stated.
+    """
     directions = [
         direction
         for direction, is_estimated in zip(chart_directions(winds), winds.estimated, strict=True)

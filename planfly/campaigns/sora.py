@@ -69,7 +69,9 @@ def min_geography_half_width(dimension: float) -> float:
 def ground_risk_class(
     density: float, dimension: float, speed: float, mass: float, *, controlled: bool = False
 ) -> int | None:
-    """Return the intrinsic ground risk class by SORA 2.5, table 2; None if the operation is not part of SORA.
+    """Return the intrinsic ground risk class by SORA 2.5, table 2.
+
+    Return None if the operation is not part of SORA.
 
     The column of the table is the first whose limits of dimension and speed are both kept.
 

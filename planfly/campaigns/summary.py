@@ -492,7 +492,10 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 
 def undecided_lines(summary: CampaignSummary) -> list[str]:
-    """Return a line with the number of undecided flights and the first reason; [] without undecided flights."""
+    """Return a line with the number of undecided flights and the first reason.
+
+    Return [] without undecided flights.
+    """
     tally = summary.estimate.tally
     if not tally.undecided:
         return []
@@ -501,7 +504,10 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
-    """Return a line on each deciding rule: its margin and the quantities that explain it; [] without deciding rules."""
+    """Return a line on each deciding rule: its margin and the quantities that explain it.
+
+    Return [] without deciding rules.
+    """
     choice_text = (
         "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter. "
     )

@@ -505,7 +505,10 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
-    """Return the name of a column unchanged; raise KeyError for any other text, which must not get into a query."""
+    """Return the name of a column unchanged.
+
+    Raise KeyError for any other text, which must not get into a query.
+    """
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name

@@ -48,7 +48,10 @@ def _best_text(result: WindowResult) -> str:
 
 
 def unjudged_lines(result: WindowResult) -> list[str]:
-    """Return one line on the rules that are not judged in some flights, each with its first reason; [] without any."""
+    """Return one line on the rules that are not judged in some flights, each with its first reason.
+
+    Return [] without any.
+    """
     texts: dict[str, str] = {}
     for departure in result.departures:
         for row in departure.rows:

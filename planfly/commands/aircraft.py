@@ -130,7 +130,10 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """List the built-in aircraft, show one, or make or identify a new one, as the options say; return the exit code."""
+    """List the built-in aircraft, show one, or make or identify a new one, as the options say.
+
+    Return the exit code.
+    """
     from planfly.api import aircraft as aircraft_api
 
     if args.logs is not None:
@@ -174,7 +177,10 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 
 def _make_folder(args: argparse.Namespace) -> int:
-    """Make the folder of a new aircraft from a data sheet or as a copy, and print its limits; return the exit code."""
+    """Make the folder of a new aircraft from a data sheet or as a copy, and print its limits.
+
+    Return the exit code.
+    """
     from aircraft.uncertainty import read_uncertainty
     from flight.dynamics.envelope_tables import load_envelope
     from planfly.api import aircraft as aircraft_api

@@ -76,7 +76,10 @@ def add_export_parser(command_line: LineParser) -> None:
 
 
 def export(args: argparse.Namespace) -> int:
-    """Write the source in the format of each target file; return the exit code: 3 for an incomplete log, else 0."""
+    """Write the source in the format of each target file.
+
+    Return the exit code: 3 for an incomplete log, else 0.
+    """
     from planfly.api import exporting
 
     names = ("fence", "at", "scenario", "autopilot", "params", "aircraft", "overwrite")

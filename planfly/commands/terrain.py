@@ -59,7 +59,10 @@ def add_terrain_parser(command_line: LineParser) -> None:
 
 
 def terrain(args: argparse.Namespace) -> int:
-    """Write the terrain of an area, and warn about missing tiles and pixels without data; return the exit code 0."""
+    """Write the terrain of an area, and warn about missing tiles and pixels without data.
+
+    Return the exit code 0.
+    """
     from planfly.api import cutting_terrain
 
     result = cutting_terrain.terrain(**args.options | {"out": args.out or "dem.tif"})

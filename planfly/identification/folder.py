@@ -112,7 +112,10 @@ class Identified:
         return Draws((*properties, DRIVE_POWER), np.column_stack([self.draws, self.drive_power]))
 
     def power_conflict(self) -> PowerConflict | None:
-        """Return the conflict between estimated drag and estimated power in level flight; None without a conflict."""
+        """Return the conflict between estimated drag and estimated power in level flight.
+
+        Return None without a conflict.
+        """
         best, _ = self.performance()
         return power_conflict(float(best.drag[0]) * self.cruise, float(best.power[0]), self.numbers.mass)
 

@@ -51,7 +51,9 @@ def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def _loose_limits_text(plan: Plan, uav: Uav) -> str:
-    """Return a warning if a plan has a turn or slope that the aircraft or its autopilot cannot fly; "" otherwise.
+    """Return a warning if a plan has a turn or slope that the aircraft or its autopilot cannot fly.
+
+    Return "" otherwise.
 
     The plan can have such a turn or slope only because of numbers in [limits].  The aircraft limits turns and slopes.
     The autopilot limits slopes by its climb and sink rates, of which a plan uses only a part: a steeper flight passes

@@ -355,7 +355,10 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Return (name, height above ground, m, index in `parts.points`) for both ends of a path; [] without terrain."""
+    """Return (name, height above ground, m, index in `parts.points`) for both ends of a path.
+
+    Return [] without terrain.
+    """
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem always has terrain
         return []
@@ -409,7 +412,10 @@ def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into the sphere of a missile; None if no gust reaches a sphere."""
+    """Return the deepest displacement by a gust into the sphere of a missile.
+
+    Return None if no gust reaches a sphere.
+    """
     threats = problem.scenario.threats
     paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
     closest_path = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
@@ -430,7 +436,10 @@ def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone; None if none."""
+    """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone.
+
+    Return None without such a displacement.
+    """
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None

@@ -122,7 +122,10 @@ def _plan_corridor_half_width(plan: Plan, uav: Uav) -> float:
 
 
 def _corner_excursions(plan: Plan, uav: Uav) -> list[float]:
-    """Return the largest distance from the legs at each corner in gusts, m; [] if the limits have no tracking error."""
+    """Return the largest distance from the legs at each corner in gusts, m.
+
+    Return [] if the limits have no tracking error.
+    """
     limits = uav.limits
     if (tracking := limits.tracking) is None:
         return []

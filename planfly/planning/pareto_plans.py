@@ -36,7 +36,10 @@ def make_pareto_plans(
     default_plan = make_plan(scenario, uav, seed, advance=advance, stop=stop, continues=continues)
 
     def finish_alternative(plan: Plan) -> Plan:
-        """Complete an alternative plan by `finish_plan`; return it as not safe if its flight leaves the forecast."""
+        """Complete an alternative plan by `finish_plan`.
+
+        Return it as not safe if its flight leaves the forecast.
+        """
         try:
             return finish_plan(plan, uav, continues=continues)
         except ForecastError as error:

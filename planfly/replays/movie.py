@@ -35,7 +35,9 @@ SUFFIXES = (".gif", ".mp4")
 def write_movie(
     log: FlightLog, target: Path, start: float, end: float, *, speed: float | None, overwrite: bool
 ) -> list[Path]:
-    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on; return the files.
+    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on.
+
+    Return the files.
 
     start, end: start and end in flight time, s.
     speed: multiple of real time; None for a film of 20 s.

@@ -129,7 +129,10 @@ class OriginGate:
         connection.add_done_callback(self._connections.discard)
 
     async def _serve_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Read the head of a request; refuse the request, or forward all data between the client and the server."""
+        """Read the head of a request.
+
+        Refuse the request, or forward all data between the client and the server.
+        """
         with contextlib.closing(writer), contextlib.suppress(OSError, asyncio.IncompleteReadError):
             try:
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_S)

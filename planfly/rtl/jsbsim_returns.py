@@ -48,7 +48,9 @@ class NearestApproaches(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Simulate a return to launch in JSBSim; return its minimum height above ground and distance from kill spheres, m.
+    """Simulate a return to launch in JSBSim.
+
+    Return its minimum height above ground and distance from kill spheres, m.
 
     The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  The result is None for
     a return that cannot be flown.

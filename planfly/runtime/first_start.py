@@ -26,7 +26,9 @@ _END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Compile units of `planfly.kernel_units` in `PROCESS_COUNT` processes; return when each is ready or has failed.
+    """Compile units of `planfly.kernel_units` in `PROCESS_COUNT` processes.
+
+    Return when each is ready or has failed.
 
     units: names of units, the unit that takes longest first.
     folder: cache folder of the kernels.

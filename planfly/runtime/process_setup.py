@@ -101,7 +101,9 @@ def address_space_limit() -> int | None:
 
 
 def with_large_stack(function: Callable[[], _Result]) -> _Result:
-    """Call a function with the frames of all inner calls in one large piece of memory; return the function's result.
+    """Call a function with the frames of all inner calls in one large piece of memory.
+
+    Return the function's result.
 
     CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty. Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating

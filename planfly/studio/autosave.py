@@ -159,7 +159,9 @@ def _scenario_name(context: EditContext) -> str:
 def read_autosave(
     file: Path, context: EditContext, document: Document, options: MissionOptions, settings: Json | None = None
 ) -> Restored | None:
-    """Return the state of a session from its autosave; None if there is no file, or if it has another schema.
+    """Return the state of a session from its autosave.
+
+    Return None if there is no file, or if it has another schema.
 
     If the opened mission is not the mission in which the edits were made, only the settings are restored.  If the
     settings cannot be restored, only the mission is restored.

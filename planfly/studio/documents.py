@@ -303,7 +303,10 @@ def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
-    """Return one line on the autopilot parameters set in the studio, which only a .parm file stores; () without any."""
+    """Return one line on the autopilot parameters set in the studio, which only a .parm file stores.
+
+    Return () without any.
+    """
     count = len(context.parameters.values)
     return (f"{count_text(count, 'parameter')} set in the studio: only a .parm contains them",) if count else ()
 

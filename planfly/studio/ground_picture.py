@@ -92,7 +92,9 @@ def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> b
 
 
 def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
-    """Return terrain altitudes on a grid (rows, columns), m AMSL, with the southern row first; NaN if unknown.
+    """Return terrain altitudes on a grid (rows, columns), m AMSL, with the southern row first.
+
+    Unknown altitudes are NaN.
 
     east, north: ranges of the map, m.
     pixels: number of values along the longer side.

@@ -51,7 +51,9 @@ class Window:
 def judge_windows(
     context: EditContext, mission: Mission, index: int, previous_setup: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge the parts of a mission's route near a moved item; return the whole route and the judged parts (windows).
+    """Judge the parts of a mission's route near a moved item.
+
+    Return the whole route and the judged parts (windows).
 
     The whole route is judged as one part if the move may change all of it, if it may contain surveys, or if the parts
     together would be as long as the route.

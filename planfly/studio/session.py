@@ -198,7 +198,10 @@ class Session:
 
     @property
     def redo_text(self) -> str:
-        """Description of the edit or of the opening that the next redo restores; "" if there is nothing to redo."""
+        """Description of the edit or of the opening that the next redo restores.
+
+        It is "" if there is nothing to redo.
+        """
         return self.history.redo_text or (f"open {self.undone_states[-1][0].name}" if self.undone_states else "")
 
     @property
@@ -310,7 +313,9 @@ class Session:
         return self.context.with_settings(self.context.scenario, self.context.parameters.with_values(known_values))
 
     def step_history(self, kind: str) -> None:
-        """Undo, redo, or revert to the mission in the file; do nothing if there is nothing to undo, redo or revert.
+        """Undo, redo, or revert to the mission in the file.
+
+        Do nothing if there is nothing to undo, redo or revert.
 
         kind: "undo", "redo" or "revert".
 

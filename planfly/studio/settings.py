@@ -114,7 +114,9 @@ def own_aircraft(scenario: Scenario) -> dict[str, str]:
 
 
 def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, str]]:
-    """Return {name of the autopilot: [flight] entries} of a scenario with a parameter file; {} without such a file.
+    """Return {name of the autopilot: [flight] entries} of a scenario with a parameter file.
+
+    Return {} without such a file.
 
     The entries are those that name the parameter file, the autopilot and its version.
     """

@@ -189,7 +189,9 @@ class WorkerProcess:
                         self._unanswered = [number for number in self._unanswered if number != task.number]
 
     def _fail_unsent(self, task: Task | None, reason: str) -> None:
-        """Answer a task that could not be sent to the process with a fault; do nothing if the worker is closed.
+        """Answer a task that could not be sent to the process with a fault.
+
+        Do nothing if the worker is closed.
 
         task: the task; None, which only cancels, has no answer.
         reason: line for the user.
@@ -223,7 +225,10 @@ class WorkerProcess:
             self._on_answer(Answer(dropped_number, "cancelled"))
 
     def _drop_unanswered(self) -> list[int]:
-        """Clear the list of the unanswered tasks of a lost process; return their numbers, except the newest task's."""
+        """Clear the list of the unanswered tasks of a lost process.
+
+        Return their numbers, except the newest task's.
+        """
         dropped_numbers = [
             number for number in self._unanswered if self._newest_task is None or number != self._newest_task.number
         ]

@@ -158,7 +158,10 @@ def find_survey_remedies(
 
 
 def _worst_margins(verdict: Verdict) -> dict[str, float]:
-    """Return the minimum margin of each failed rule of a verdict, by rule; -inf if a failure has no margin."""
+    """Return the minimum margin of each failed rule of a verdict, by rule.
+
+    The margin is -inf if a failure has none.
+    """
     margins: dict[str, float] = {}
     for finding in verdict.findings:
         if finding.ok is False:
@@ -174,7 +177,10 @@ def _count_usable(verdict: Verdict) -> tuple[int, int]:
 
 
 def _usable_parts(verdict: Verdict) -> list[float]:
-    """Return the usable part of each photo line according to a verdict, %; 0 for a line not flown or not judged."""
+    """Return the usable part of each photo line according to a verdict, %.
+
+    It is 0 for a line that was not flown or not judged.
+    """
     return [0.0 if finding.flown is None else finding.flown for finding in _line_findings(verdict)]
 
 
@@ -358,7 +364,10 @@ class _Trials:
         return None
 
     def find_turn_around(self) -> SurveyRemedy | None:
-        """Find the shortest turn-around distance above the current one that passes; return None if none passes."""
+        """Find the shortest turn-around distance above the current one that passes.
+
+        Return None if none passes.
+        """
         return self._find_shortest_turn_around(1, self._longer_turn_arounds(), 0.0)
 
     def _longer_turn_arounds(self) -> list[float]:
@@ -549,7 +558,10 @@ class _Trials:
         return None if remedy is None else replace(remedy, kind="gates", current=0.0, value=1.0, unit="")
 
     def find_gates_and_airspeed(self) -> SurveyRemedy | None:
-        """Try the reduced airspeeds with gates; return None if the lines have no place for gates, or if none passes."""
+        """Try the reduced airspeeds with gates.
+
+        Return None if the lines have no place for gates, or if none passes.
+        """
         if _with_gates(self._setup, self._surveys) == self._setup.mission:
             return None
         return self.find_airspeed(has_gates=True)
@@ -746,5 +758,8 @@ def ordinal_text(number: int) -> str:
 
 
 def _commanded_airspeed(item: MissionItem) -> float:
-    """Return the airspeed that a DO_CHANGE_SPEED item sets, m/s; NaN or negative if it sets none; 0 for other items."""
+    """Return the airspeed that a DO_CHANGE_SPEED item sets, m/s.
+
+    It is NaN or negative if the item sets none, and 0 for other items.
+    """
     return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0

@@ -104,7 +104,10 @@ def parse_area(text: str) -> tuple[float, ...]:
 
 
 def parse_autopilots(text: str) -> list[str]:
-    """Parse the names of autopilots, separated by commas; raise argparse.ArgumentTypeError for an unknown name."""
+    """Parse the names of autopilots, separated by commas.
+
+    Raise argparse.ArgumentTypeError for an unknown name.
+    """
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:

@@ -309,7 +309,9 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
 
 
 def _similar_option_hint(option: str, options: Iterable[str]) -> str:
-    """Return the end of a message that suggests the option most similar to an unknown option; "" if none is similar.
+    """Return the end of a message that suggests the option most similar to an unknown option.
+
+    Return "" if none is similar.
 
     The leading dashes, which all options share, are not compared.
 

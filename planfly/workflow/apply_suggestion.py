@@ -181,7 +181,9 @@ class _EditedMission:
         self.offsets: dict[int, Floats] = {}
 
     def item_index(self, waypoint: int) -> int | None:
-        """Return the index in the mission's list of the item of a waypoint; None for a waypoint without an item.
+        """Return the index in the mission's list of the item of a waypoint.
+
+        Return None for a waypoint without an item.
 
         waypoint: number of the waypoint in the route.
         """

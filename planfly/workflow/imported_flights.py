@@ -390,7 +390,9 @@ class DrawnFlight:
 def fly_draws(
     setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
 ) -> tuple[Reflight, ...]:
-    """Simulate the longest sequence of legs that the flight followed once per draw; return the comparisons.
+    """Simulate the longest sequence of legs that the flight followed once per draw.
+
+    Return the comparisons.
 
     A draw is left out if its aircraft cannot start or flies none of the legs.
 

@@ -138,7 +138,9 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Check an output folder, make it if it is missing, and remove old results of planfly; return its path.
+    """Check an output folder, make it if it is missing, and remove old results of planfly.
+
+    Return its path.
 
     files: names of the results to remove, as for `prepare_folder`.
     overwrite: True permits a folder that is not empty.

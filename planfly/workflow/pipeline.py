@@ -198,7 +198,10 @@ class FlownMission:
 
     @property
     def returns_line(self) -> str:
-        """One line on returns to launch from a few points of the flight; "" for a mission without home or terrain."""
+        """One line on returns to launch from a few points of the flight.
+
+        It is "" for a mission without home or terrain.
+        """
         return self.return_summary.line
 
     @property

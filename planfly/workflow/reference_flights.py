@@ -126,7 +126,9 @@ def find_passing_parameter(
 def _nearest_passing_value(
     current: float, step: float, farthest: float, passes: Callable[[float], bool]
 ) -> float | None:
-    """Return the passing value nearest to the current value; None if neither the farthest nor the middle value passes.
+    """Return the passing value nearest to the current value.
+
+    Return None if neither the farthest nor the middle value passes.
 
     Values are tried in steps from `current` to `farthest`.  The search begins at `farthest`; if this value fails, it
     begins halfway, because a parameter can also be changed too much.
@@ -194,7 +196,9 @@ def judge_airframe_flight(
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find an autopilot parameter that makes a failed flight pass if it has another value; None if none is found.
+    """Find an autopilot parameter that makes a failed flight pass if it has another value.
+
+    Return None if none is found.
 
     The result is also None for a flight that passes, and for an autopilot without parameters.
 

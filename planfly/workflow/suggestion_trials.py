@@ -633,7 +633,9 @@ def _has_passing_part(passed_trials: Sequence[PassedTrial], finding: Finding, su
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
-    """Return a suggestion enlarged by what the mission still needs after it; None if no enlargement is known.
+    """Return a suggestion enlarged by what the mission still needs after it.
+
+    Return None if no enlargement is known.
 
     If the finding still does not pass, the enlargement is what this finding needs. Otherwise it is what the other legs
     need for the same rule.
@@ -667,7 +669,10 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
-    """Return a suggestion enlarged by what an open finding still needs; None if it needs another kind of change."""
+    """Return a suggestion enlarged by what an open finding still needs.
+
+    Return None if it needs another kind of change.
+    """
     kinds = {change.what for change in suggestion}
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:

@@ -116,7 +116,10 @@ def uav_of_setup(setup: FlightSetup) -> Uav:
 
 
 def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
-    """Return the bank limit in turns, rad: the lower of scenario and autopilot; inf if neither has a limit."""
+    """Return the bank limit in turns, rad: the lower of scenario and autopilot.
+
+    Return inf if neither has a limit.
+    """
     stated_bank = scenario.flight.max_bank_deg
     return min(math.inf if stated_bank is None else math.radians(stated_bank), autopilot.turns.max_bank)
 

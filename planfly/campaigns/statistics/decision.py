@@ -461,7 +461,9 @@ def dependence_p_value(x: Floats, y: Floats) -> float:
 
 
 def rank_slope(x: Floats, y: Floats) -> float:
-    """Return Spearman's rank correlation of x and y, -1 to 1; 0 for fewer than three values, or if x or y is constant.
+    """Return Spearman's rank correlation of x and y, -1 to 1.
+
+    Return 0 for fewer than three values, or if x or y is constant.
 
     >>> rank_slope(np.arange(5.0), -np.arange(5.0) ** 3)
     -1.0
