@@ -1,4 +1,6 @@
-"""Will this plan really fly?  Plan a fixed-wing path, fly it in JSBSim over its terrain and threats, and judge it.
+"""Find out if a plan will really fly: plan a path, fly it in JSBSim, and judge the flight.
+
+Paths are for fixed-wing aircraft, over terrain and among threats.
 
     import planfly
 

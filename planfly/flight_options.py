@@ -1,4 +1,7 @@
-"""Define the options of a flight, which have the same names in keywords, the command line and a scenario."""
+"""Define the options of a flight.
+
+They have the same names in keywords, the command line and a scenario.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -451,7 +454,7 @@ def apply_options(
 
 
 def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
-    """Raise ArgumentError if the options name an unknown aircraft, or an airspeed that the aircraft cannot fly.
+    """Raise ArgumentError for an unknown aircraft, or an airspeed that the aircraft cannot fly.
 
     Raises FlightError for a wrong value in a named aircraft's own file.  An aircraft that only the scenario names is
     not checked, if it cannot be loaded.

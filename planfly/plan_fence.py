@@ -1,4 +1,7 @@
-"""Write a plan's threats, area and zones as a fence of its mission that the planned path does not violate."""
+"""Write a plan's threats, area and zones as a fence of its mission.
+
+The planned path does not violate this fence.
+"""
 
 from flight.mission.fences import fence_zones, with_fences
 from flight.mission.items import Mission, MissionItem

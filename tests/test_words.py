@@ -11,6 +11,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 CLAUSE = re.compile(r"(What|Whether|How|Where|Which|Who|Whoever|Whatever)\b")
+# Longest first line of a docstring, characters.
+MAX_FIRST_LINE = 100
 REPLACED_WORDS = re.compile(r"\b(amiss|anew|whoever|nobody|anybody)\b", re.IGNORECASE)
 
 
@@ -62,6 +64,11 @@ except ValueError:
 
 def test_no_docstring_opens_with_a_clause() -> None:
     found = [f"{file}: {text.splitlines()[0]}" for file, text in docstrings() if CLAUSE.match(text)]
+    assert found == []
+
+
+def test_the_first_line_of_a_docstring_has_at_most_100_characters() -> None:
+    found = [f"{file}: {first}" for file, text in docstrings() if len(first := text.splitlines()[0]) > MAX_FIRST_LINE]
     assert found == []
 
 

@@ -1,4 +1,7 @@
-"""Decorator for functions of the public API: check their arguments, and compile the kernels that they need."""
+"""Decorator for functions of the public API.
+
+It checks their arguments, and compiles the kernels that they need.
+"""
 
 import functools
 import inspect
@@ -38,7 +41,10 @@ def api_function(*kernel_units: str) -> Callable[[Callable[_Parameters, _Result]
     """
 
     def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-        """Return the function with checks and compilation before each call, and with its options in its signature."""
+        """Return the function with checks and compilation before each call.
+
+        The options of the function are in its signature.
+        """
         signature, defaults = inspect.signature(function), dict[str, object]()
         *parameters, last = signature.parameters.values()
         if last.kind is last.VAR_KEYWORD:

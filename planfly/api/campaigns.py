@@ -1,4 +1,7 @@
-"""Find the probability that a mission is flyable, its strongest winds and its smallest battery, by many flights."""
+"""Find by many flights if a mission is flyable.
+
+The answer is its probability, its strongest winds or its smallest battery.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -65,7 +68,7 @@ from world.wording import count_text
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again, with the same outcome.
+    """Result of `planfly.campaign_flight`: a flight of a campaign, flown again with the same outcome.
 
     row: outcome, reason for the end, and failed rules.
     log: the file of the flight log.
@@ -126,7 +129,9 @@ def _name_command_line_target(target: Plan | Scenario | str | Path, folder: Path
 
 
 def _write_scenario_file(scenario: Scenario, folder: Path) -> str:
-    """Write a scenario into a campaign's folder, and return its path for the command line that repeats the campaign.
+    """Write a scenario into a campaign's folder, and return its path.
+
+    The path is for the command line that repeats the campaign.
 
     A scenario made around a mission cannot be written; its name is returned.
     """
@@ -434,7 +439,9 @@ def winds(
 
 
 def open_sample(target: Plan | Scenario | str | Path, options: SampleOptions) -> CampaignBase:
-    """Open the mission for a search whose flights are not stored on disk; for a scenario, plan a path first.
+    """Open the mission for a search whose flights are not stored on disk.
+
+    For a scenario, plan a path first.
 
     Raises PlanflyError for bad input.
     """

@@ -210,7 +210,9 @@ def _find_chosen_autopilot(autopilot: str | None, params: str | Path | None) -> 
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Return a source with the autopilot for a .plan, and with notes on content that the .plan will not have.
+    """Return a source with the autopilot for a .plan, and with notes on lost content.
+
+    The .plan will not have this content.
 
     The .plan has the autopilot that the user named, or else the source's autopilot, or else `DEFAULT_AUTOPILOT`.
 

@@ -91,7 +91,10 @@ class Judged:
 
     @property
     def return_summary(self) -> ReturnSummary:
-        """Simulated returns to launch from a few points of the flight or planned path, computed at each access."""
+        """Simulated returns to launch from a few points of the flight or planned path.
+
+        They are computed at each access.
+        """
         return return_summary(self.setup, self.track, self.requirements)
 
 

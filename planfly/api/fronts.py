@@ -120,7 +120,10 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
 
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
-    """Return a row for each plan of a front, with the keys `COLUMNS`; an unknown value, such as energy, is None."""
+    """Return a row for each plan of a front, with the keys `COLUMNS`.
+
+    An unknown value, such as energy, is None.
+    """
     return [_make_table_row(number, front_plan) for number, front_plan in enumerate(front.plans, 1)]
 
 

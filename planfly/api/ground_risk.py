@@ -1,4 +1,7 @@
-"""Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas."""
+"""Find the volumes and the ground risk class of a mission by SORA 2.5.
+
+They follow from many flights and from formulas.
+"""
 
 from dataclasses import replace
 from pathlib import Path

@@ -172,7 +172,9 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
-    """Return the result of an identification, with the aircraft's performance and the deficiencies of the logs.
+    """Return the result of an identification.
+
+    It has the aircraft's performance and the deficiencies of the logs.
 
     aircraft: the aircraft as read from its new folder.
     records: usable segments of the logs.
@@ -293,7 +295,10 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
-    """Return the quantities among sink angle and power that the logs determine only within a wide interval."""
+    """Return the quantities that the logs determine only within a wide interval.
+
+    The quantities are sink angle and power.
+    """
     _, sink, power = _compute_performance_intervals(identified)
     return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 

@@ -51,7 +51,9 @@ class Reflown:
 
 @api_function()
 def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
-    """Read and judge a flight from another program's log, with the options of `import_log`, without writing a log.
+    """Read and judge a flight from another program's log, without writing a log.
+
+    The options are those of `import_log`.
 
     Raises ScenarioError for an option that does not apply to a flight from a log.
     """
@@ -224,7 +226,9 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
 
 
 def recovered_path(log: str | Path) -> Path:
-    """Return the default path for the readable part of a damaged log: ``<log>-recovered.mcap`` next to the log.
+    """Return the default path for the readable part of a damaged log.
+
+    It is ``<log>-recovered.mcap`` next to the log.
 
     >>> recovered_path("runs/flight.mcap").name
     'flight-recovered.mcap'

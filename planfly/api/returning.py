@@ -119,7 +119,7 @@ class ReturnsResult:
 
     @property
     def program_lines(self) -> tuple[str, ...]:
-        """Lines that compare the worst returns as flown by the ArduPlane program and by the simulated ArduPlane.
+        """Lines that compare the worst returns of the ArduPlane program and of the simulated ArduPlane.
 
         The tuple is empty if no program was named.
         """
@@ -129,7 +129,10 @@ class ReturnsResult:
 
     @property
     def no_return_line(self) -> str:
-        """Line on the point of no return: the point of the flight after which the energy is too low for a return."""
+        """Line on the point of no return.
+
+        After this point of the flight the energy is too low for a return.
+        """
         return point_of_no_return_text(self.returns)
 
     @property

@@ -262,7 +262,9 @@ def _fly_rounds(
 
 
 def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
-    """Write a plan, its mission and its verdict into the run's folder; if the plan is feasible, fly and report it.
+    """Write a plan, its mission and its verdict into the run's folder.
+
+    If the plan is feasible, fly and report it.
 
     number: number of the round, from 0.
     """

@@ -1,4 +1,7 @@
-"""Serve a simulated MAVLink vehicle, to which ground stations connect to upload missions, arm and follow the flight."""
+"""Serve a simulated MAVLink vehicle.
+
+Ground stations connect to it to upload missions, arm and follow the flight.
+"""
 
 import ipaddress
 from collections.abc import Callable, Sequence
@@ -42,7 +45,9 @@ def serve(
     on_message: Callable[[str], None] = _ignore_message,
     **options: Unpack[MissionOptions],
 ) -> None:
-    """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True; requires ``planfly[live]``.
+    """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True.
+
+    Requires ``planfly[live]``.
 
     mission: the file of the first mission; None waits for an upload into the scenario that the options name.
     options: options of `planfly.fly`.

@@ -1,1 +1,4 @@
-"""Campaigns: many flights of one mission, each with its own draw of the dispersions, and the probability of success."""
+"""Campaigns: many flights of one mission, and the probability of success.
+
+Each flight has its own draw of the dispersions.
+"""

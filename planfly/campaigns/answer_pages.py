@@ -54,7 +54,9 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
 
 
 def battery_page(result: BatteryResult, figure: Figure, command: str) -> AnswerPage:
-    """Return the page of a battery search: the chart, a table of what decides the capacity, and the energy by leg.
+    """Return the page of a battery search.
+
+    It has the chart, a table of what decides the capacity, and the energy by leg.
 
     The capacity of a flight is decided by the end of the mission or by the simulated return to launch that has used
     more energy.

@@ -1,4 +1,7 @@
-"""Draw the chart of a battery: the share of the flights that keep the reserve, by the battery's capacity."""
+"""Draw the chart of a battery.
+
+It shows the share of the flights that keep the reserve, by the battery's capacity.
+"""
 
 import math
 
@@ -51,7 +54,9 @@ def draw_battery(result: BatteryResult) -> Figure:
 
 
 def _draw_capacities(axes: Axes, result: BatteryResult, needed: Floats) -> None:
-    """Draw the needed capacities as steps, the required probability, the found capacity and the aircraft's capacity.
+    """Draw the needed capacities as steps, and the required probability.
+
+    The found capacity and the aircraft's capacity are marked.
 
     needed: finite capacities that the flights need, Wh, ascending, (n,).
     """

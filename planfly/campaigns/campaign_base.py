@@ -1,4 +1,7 @@
-"""Open the mission, world, aircraft and dispersions that a campaign's flights share, and vary them for each flight."""
+"""Open what a campaign's flights share, and vary it for each flight.
+
+The flights share mission, world, aircraft and dispersions.
+"""
 
 import hashlib
 import json
@@ -203,7 +206,9 @@ def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignB
 
 
 def _check_base(base: CampaignBase) -> CampaignBase:
-    """Return a campaign base unchanged, after checking that its aircraft can fly and its mission has a route.
+    """Return a campaign base unchanged after its checks.
+
+    Its aircraft must be able to fly, and its mission must have a route.
 
     Raises PlanflyError if the aircraft cannot fly level at the medians of the dispersions, or if the mission has no
     valid route.
@@ -262,7 +267,9 @@ _VARIED_PROPERTIES = {"aero/drag-factor": "drag", "aero/control-factor": "contro
 
 
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
-    """Return dispersions with the draws of the aircraft's properties, if the aircraft's folder has a file of draws.
+    """Return dispersions with the draws of the aircraft's properties.
+
+    The draws are in a file in the aircraft's folder, if it has one.
 
     A dispersions file is used unchanged if it names other draws, or disperses drag or control power itself.
     """

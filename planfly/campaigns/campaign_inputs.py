@@ -1,4 +1,7 @@
-"""Compare the inputs of two campaigns: scenario, mission, aircraft, parameters, dispersions and seed, each by name."""
+"""Compare the inputs of two campaigns, each by name.
+
+Inputs are scenario, mission, aircraft, parameters, dispersions and seed.
+"""
 
 import hashlib
 import json

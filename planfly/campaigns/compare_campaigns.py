@@ -1,4 +1,7 @@
-"""Compare two campaigns: their probabilities, the difference, the rules that fail more often, and their inputs."""
+"""Compare two campaigns.
+
+Compared are their probabilities, the rules that fail more often, and their inputs.
+"""
 
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -67,7 +70,10 @@ class CampaignComparison:
 
     @property
     def rules(self) -> list[tuple[str, int, int]]:
-        """Each failed rule, with the number of flights that failed it in either campaign; the largest change first."""
+        """Each failed rule, with the number of flights that failed it in either campaign.
+
+        The largest change comes first.
+        """
         first, second = self.first, self.second
         names = [name for name in RULE_WORDS if name in first.failed_by_rule or name in second.failed_by_rule]
         counts = [(name, first.failed_by_rule.get(name, 0), second.failed_by_rule.get(name, 0)) for name in names]

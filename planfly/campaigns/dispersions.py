@@ -171,7 +171,10 @@ class Dispersions:
         return replace(self.without(QUANTITIES_OF_DRAWS), draws=draws)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
-        """Return plain data with a table for each quantity, and one for the aircraft's draws, if there are any."""
+        """Return plain data with a table for each quantity, and one for the aircraft's draws.
+
+        The latter is left out without such draws.
+        """
         tables: dict[str, dict[str, Any]] = {
             varying.quantity.name: {
                 "distribution": varying.distribution,

@@ -1,4 +1,6 @@
-"""Compute where an aircraft that has lost control hits the ground: without drag, or with its wing broadside to the air.
+"""Compute the place where an aircraft that has lost control hits the ground.
+
+It falls without drag, or with its wing broadside to the air.
 
 A fall without drag goes farthest ahead.  A fall with the wing broadside to the air drifts farthest with the wind.  The
 impact point of any other fall lies between these two.

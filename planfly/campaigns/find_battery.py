@@ -1,4 +1,6 @@
-"""Find the smallest battery with which a mission and all its returns to launch keep the reserve, by many flights.
+"""Find the smallest battery with which a mission and its returns keep the reserve.
+
+It is found by many flights and their returns to launch.
 
 Each flight of a campaign is flown with a battery that does not run empty, and needs the largest of two energies: the
 energy used at the end of the mission, and the highest energy used at the end of any return to launch.  The capacity
@@ -112,7 +114,9 @@ class EnergyRow(FlightRow):
 def fly_for_energy(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, interval: float, mass_factor: float
 ) -> EnergyRow:
-    """Fly one flight of a campaign with an endless battery, simulate its returns to launch, and return its row.
+    """Fly one flight of a campaign with an endless battery, and return its row.
+
+    Its returns to launch are simulated, too.
 
     The row has no energies if the flight does not complete the mission.
 
@@ -187,7 +191,9 @@ class CapacityRange(NamedTuple):
 
 
 class BatteryDecision(NamedTuple):
-    """Part that decides the capacity in some flights: the end of the mission, or the returns that start on one leg.
+    """Part that decides the capacity in some flights.
+
+    It is the end of the mission, or the returns that start on one leg.
 
     flights: number of flights in which this part needs the most energy.
     leg: number of the leg on which the deciding return starts, as in messages; -1 for the end of the mission.
@@ -370,7 +376,9 @@ def fly_energy_campaign(
 
 
 def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tuple[float, CapacityRange]:
-    """Return the capacity that keeps the reserve with the goal's probability, Wh, and its confidence interval.
+    """Return the capacity that keeps the reserve with the goal's probability, Wh.
+
+    Also return its confidence interval.
 
     The capacity is a quantile of the capacities that the flights need; its interval follows from order statistics.
     The capacity or a bound is inf if no battery is enough.  All three are NaN if too few flights have a known energy to

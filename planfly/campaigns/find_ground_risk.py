@@ -1,4 +1,6 @@
-"""Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas.
+"""Find the volumes and the ground risk class of a mission by SORA 2.5.
+
+They follow from many flights and from formulas.
 
 Each flight of a campaign gives two areas: the area below the flight and its simulated returns to launch (here:
 returns), and the area in which the aircraft can fall from them.  The flight geography is a corridor around the planned
@@ -219,7 +221,9 @@ class _ReturnPaths(NamedTuple):
 
 
 def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: bool) -> _ReturnPaths:
-    """Simulate the returns to launch from a track, and give their paths; there are none for a mission without home.
+    """Simulate the returns to launch from a track, and return their paths.
+
+    There are none for a mission without home.
 
     interval: time between the starts of two returns, s.
     glide: True to simulate also returns after an engine failure; only their glides that reach the ground are kept.
@@ -270,7 +274,9 @@ def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
 def turn_areas(
     times: Floats, positions: Floats, start_times: Floats, turns: list[Floats], interval: float
 ) -> list[BaseGeometry]:
-    """Return areas that contain the first turns of all returns that may start between two simulated returns.
+    """Return areas that contain the first turns of returns.
+
+    The returns are those that may start between two simulated returns.
 
     Each area is the path flown between two successive starts, widened by the larger extent of their turns from it.
 
@@ -406,7 +412,9 @@ class GroundRiskResult:
 
     @property
     def is_judged(self) -> bool:
-        """True if the ground risk class is decided, also if the decision is that the operation is not part of SORA.
+        """True if the ground risk class is decided.
+
+        Also True if the operation is decided not to be part of SORA.
 
         It needs a home for the returns, and a controlled ground area or population data for the whole footprint.
         """

@@ -1,4 +1,7 @@
-"""Find the departures at which a mission is flyable in a weather forecast, by many flights for each of them."""
+"""Find the departures at which a mission is flyable in a weather forecast.
+
+Each departure is judged by many flights.
+"""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,7 @@
-"""Find the strongest wind from each direction in which a mission is flyable, by rounds of informative flights."""
+"""Find the strongest wind from each direction in which a mission is flyable.
+
+The flights are chosen in rounds by the information that they give.
+"""
 
 import math
 from collections import Counter
@@ -138,7 +141,9 @@ WindsAnswer = Literal["judged", "not flyable", "not judged in full", "not judged
 
 @dataclass(frozen=True, repr=False)
 class WindsResult:
-    """Result of a search: the boundary of each direction, and the flights from which the boundaries are estimated.
+    """Result of a search: the boundary of each direction, and the flights.
+
+    The boundaries are estimated from the flights.
 
     boundaries: boundary of each direction; `judged` and `reasons` state which of them are only estimates, and why.
     flights: for each flight, the index of its direction, the wind speed, m/s, and True if it was flyable.
@@ -179,7 +184,7 @@ class WindsResult:
 
     @property
     def flown_bounds(self) -> tuple[tuple[float | None, float | None], ...]:
-        """For each direction, the strongest flyable wind below any failure, and the weakest wind with a failure, m/s.
+        """Strongest flyable wind below any failure, and weakest wind with a failure, by direction, m/s.
 
         Each is None if there is no such wind.  Lost and undecided flights are left out.
         """
@@ -239,7 +244,9 @@ class WindsResult:
 
     @property
     def estimated(self) -> tuple[bool, ...]:
-        """True for each direction whose boundary is stated, because it is judged, or only its interval is too wide.
+        """True for each direction whose boundary is stated.
+
+        Such a direction is judged, or only its interval is too wide.
 
         Otherwise there are too few flights, so that boundary and interval depend mostly on assumptions, or some flights
         are not judged in full and may lie on either side of the boundary.
@@ -303,7 +310,9 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsResult:
-    """Fly rounds of flights until the boundary of each direction is accurate enough, and return the boundaries.
+    """Fly rounds of flights until the boundary of each direction is accurate enough.
+
+    Return the boundaries.
 
     At most `goal.flights` flights are flown.
 
@@ -528,7 +537,10 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:
-    """Return the failure mode of a failed rule: a key of the rule and the place, without item numbers and names."""
+    """Return the failure mode of a failed rule: a key of the rule and the place.
+
+    The key has no item numbers and names.
+    """
     return rule, place.kind, place.index
 
 
@@ -573,7 +585,10 @@ class _ProgressReport:
         self._search, self._advance, self._rate = search, advance, FlightRate(stored_count)
 
     def report_start(self, flight_count: int) -> None:
-        """Report, before the first flight, the number of flights in the table and the minimum number of flights."""
+        """Report, before the first flight, the number of flights in the table.
+
+        Also report the minimum number of flights.
+        """
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
             remark = f"{flight_count} of {count_text(total, 'flight')} at least"
@@ -586,7 +601,9 @@ class _ProgressReport:
             self._advance(float(flight_count), float(flight_count), text)
 
     def report(self, flight_count: int, force: bool = False) -> None:
-        """Report the number of closed directions, the number and rate of flights, and the least remaining time.
+        """Report the number of closed directions, and the number and rate of flights.
+
+        Also report the least remaining time.
 
         No remaining time is given once each open direction has `MIN_FLIGHTS_PER_DIRECTION` flights, because the number
         of further flights is then unknown.

@@ -1,4 +1,7 @@
-"""Define the flights that a campaign requests and the copy of the campaign on each worker, and check the workers."""
+"""Define the flights that a campaign requests, and the campaign's copy on each worker.
+
+The workers are checked.
+"""
 
 import hashlib
 import pickle

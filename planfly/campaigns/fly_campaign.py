@@ -110,7 +110,7 @@ def fly_campaign(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> Estimate:
-    """Fly the flights missing from the table until the number of flights is reached or the goal is decided.
+    """Fly the flights missing from the table until their number is reached or the goal is decided.
 
     Return the estimate of the probability of a flyable flight.  Flights are tallied in the order of their indices, and
     flights after the deciding flight are deleted.  Answer and table therefore do not depend on the speed of the
@@ -171,7 +171,9 @@ class _ProgressReport:
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, force: bool = False) -> None:
-        """Report the number of flights, the fraction of flyable flights with its bounds, and the remaining time.
+        """Report the number of flights, and the fraction of flyable flights with its bounds.
+
+        Also report the remaining time.
 
         force: True to report even if no report is due.
         """

@@ -143,7 +143,10 @@ def table_text(result: GroundRiskResult) -> str:
 
 
 def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the rows of the table for an application: quantity, value and source; cells in bold begin with "**"."""
+    """Return the rows of the table for an application: quantity, value and source.
+
+    Cells in bold begin with "**".
+    """
     flown, formula, goal = result.flown, result.formula, result.goal
     span = result.aircraft.wing_span
     share_text = _share_text(result)
@@ -212,7 +215,10 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
 
 
 def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the last rows of the table: population, row and column of SORA's table, and ground risk class."""
+    """Return the last rows of the table.
+
+    They are population, row and column of SORA's table, and ground risk class.
+    """
     rows = [("**intrinsic ground risk class**", "", "")]
     population = result.population
     if population is not None:

@@ -1,4 +1,7 @@
-"""Fly the landing of a plan with a steep final in dispersed conditions, because a plan does not model the flare."""
+"""Fly the landing of a plan with a steep final in dispersed conditions.
+
+A plan does not model the flare.
+"""
 
 import math
 from dataclasses import replace
@@ -49,7 +52,9 @@ def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
 
 
 def landing_mission(mission: Mission) -> Mission:
-    """Return the end of a plan's mission: the last waypoint before the line-up, the line-up and the landing.
+    """Return the end of a plan's mission.
+
+    It has the last waypoint before the line-up, the line-up and the landing.
 
     The items are numbered from 1.
     """

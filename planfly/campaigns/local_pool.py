@@ -1,4 +1,7 @@
-"""Fly a campaign in plain processes on this machine, without sockets; each process flies one flight at a time."""
+"""Fly a campaign in plain processes on this machine, without sockets.
+
+Each process flies one flight at a time.
+"""
 
 import errno
 import os

@@ -1,4 +1,7 @@
-"""Write the page of an answer from many flights: answer, pictures, tables, and the command that repeats it."""
+"""Write the page of an answer from many flights.
+
+It has the answer, pictures, tables, and the command that repeats it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -80,7 +83,9 @@ def render_page(template: str, **values: object) -> str:
 
 
 def draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return HTML with a figure in a wide and a narrow layout; the figure itself is changed to the narrow layout.
+    """Return HTML with a figure in a wide and a narrow layout.
+
+    The figure itself is changed to the narrow layout.
 
     caption: text alternative of the figure.
     """

@@ -1,4 +1,7 @@
-"""Draw a campaign's failures by place, its probability against wind, its tracks, and the go/no-go chart."""
+"""Draw the pictures of a campaign.
+
+They show failures by place, probability against wind, tracks, and the go/no-go chart.
+"""
 
 import math
 import textwrap
@@ -41,7 +44,9 @@ MAX_BARS = 14
 
 
 def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
-    """Draw a bar chart of the failed flights for each rule and place, the most frequent first, at most `MAX_BARS`.
+    """Draw a bar chart of the failed flights for each rule and place.
+
+    The most frequent come first; there are at most `MAX_BARS`.
 
     counts: for each rule and place, the rule's title, the place in words, and the number of flights that failed there.
     flights: total number of flights.
@@ -121,7 +126,9 @@ class Bar:
 
 
 def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
-    """Count the flights and the flyable flights in each range of wind speeds; ranges without a flight are omitted.
+    """Count the flights and the flyable flights in each range of wind speeds.
+
+    Ranges without a flight are omitted.
 
     speed: wind speed of each flight, m/s, (n,).
     flyable: True for a flyable flight, (n,).
@@ -151,7 +158,9 @@ def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float 
 
 
 def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
-    """Draw the fraction of flyable flights against wind speed, with its interval and the numbers of flights.
+    """Draw the fraction of flyable flights against wind speed.
+
+    Its interval and the numbers of flights are shown.
 
     target: required probability, drawn as a line, or None.
     bins: flights by ranges of wind speed, see `group_by_speed`.

@@ -1,4 +1,7 @@
-"""Suggest changes that raise the probability of a planned mission, from the rules that its flights failed."""
+"""Suggest changes that raise the probability of a planned mission.
+
+They follow from the rules that its flights failed.
+"""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Write the files of a campaign's folder: summary, report page, logs of the worst flights, and go/no-go chart."""
+"""Write the files of a campaign's folder.
+
+These are summary, report page, logs of the worst flights, and go/no-go chart.
+"""
 
 import json
 import math
@@ -462,7 +465,9 @@ def _speed_text(speed: float, max_speed: float) -> str:
 
 
 def _interval_text(lower: float, upper: float, max_speed: float) -> str:
-    """Return an interval of the boundary as text, such as "9.1 to 9.9", or "9.1 to over 20" at the maximum wind.
+    """Return an interval of the boundary as text, such as "9.1 to 9.9".
+
+    At the maximum wind it is "9.1 to over 20".
 
     lower, upper, max_speed: m/s.
     """
@@ -507,7 +512,9 @@ def _deciding_rules(winds: WindsResult) -> list[str]:
 
 
 def _flown_bound_lines(winds: WindsResult) -> list[str]:
-    """Return lines on the directions without a stated boundary: strongest wind without and weakest wind with a failure.
+    """Return lines on the directions without a stated boundary.
+
+    They state the strongest wind without and the weakest wind with a failure.
 
     Neighbouring directions with the same text share a line.  Returns [] if all boundaries are stated, or if only calm
     air was flown.

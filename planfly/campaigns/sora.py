@@ -153,7 +153,9 @@ class ContingencyFormula:
 
 
 def one_to_one_buffer(height: float, dimension: float) -> float:
-    """Return the width of the ground risk buffer by the 1:1 rule, S_GRB = H_CV + CD / 2, m (Annex A, LBA, FOCA).
+    """Return the width of the ground risk buffer by the 1:1 rule, m.
+
+    It is S_GRB = H_CV + CD / 2 (Annex A, LBA, FOCA).
 
     height: height of the operational volume above ground, H_CV, m.
     dimension: largest dimension of the aircraft, CD, m.
@@ -165,7 +167,9 @@ def one_to_one_buffer(height: float, dimension: float) -> float:
 
 
 def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
-    """Return the width of the ground risk buffer for a fall without drag, S_GRB = v sqrt(2 H_CV / g) + CD / 2, m.
+    """Return the width of the ground risk buffer for a fall without drag, m.
+
+    It is S_GRB = v sqrt(2 H_CV / g) + CD / 2.
 
     Annex A, LBA and FOCA use this formula for rotorcraft only.
     height, dimension: H_CV and CD as for `one_to_one_buffer`, m.

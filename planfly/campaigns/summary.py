@@ -1,4 +1,7 @@
-"""Summarise a campaign's probability, failures by place, deciding quantities, and worst flights as data."""
+"""Summarise a campaign as data.
+
+The data are its probability, failures by place, deciding quantities, and worst flights.
+"""
 
 import json
 import math
@@ -275,7 +278,10 @@ def _rank_rules(
 
 
 def _margin_unit(store: Store, rule: str) -> str:
-    """Return the unit of a rule's margins, from the first flight that has a margin, or else the rule's usual unit."""
+    """Return the unit of a rule's margins.
+
+    It is taken from the first flight that has a margin, or else it is the rule's usual unit.
+    """
     words = RULE_WORDS[rule]
     place_json = store.first_text(words.place_column)
     if place_json is not None:
@@ -534,7 +540,9 @@ def deciding_lines(summary: CampaignSummary) -> list[str]:
 
 
 def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
-    """Return the JUnit suite of a campaign: a test case for its target, and one for each rule that a flight failed.
+    """Return the JUnit suite of a campaign.
+
+    It has a test case for its target, and one for each rule that a flight failed.
 
     name: mission of the campaign.
 

@@ -277,7 +277,10 @@ class LockedTable:
         report_line(f"{self.path}: {examination.describe()}")
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table contains more flights than the settings request; here, accept any number."""
+        """Raise StoreError if the table contains more flights than requested; here, accept any number.
+
+        The settings state the requested number.
+        """
 
     def __enter__(self) -> Self:
         """Return the locked table."""
@@ -473,7 +476,10 @@ class Store(LockedTable):
         return None if row is None else str(row[0])
 
     def blobs(self, name: str, max_count: int) -> list[bytes]:
-        """Return the bytes of a column of arrays for the first `max_count` flights that have an array, in order."""
+        """Return the bytes of a column of arrays, in order.
+
+        They are those of the first `max_count` flights that have an array.
+        """
         query = f"SELECT {_check_column(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
         return [value for (value,) in self._connection.execute(query, (max_count,))]
 
@@ -658,7 +664,9 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def with_place_numbers(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return the columns with each column of places (JSON texts) replaced by kind, index and item of the place.
+    """Return the columns with each column of places (JSON texts) replaced.
+
+    It is replaced by kind, index and item of the place.
 
     The new names end in _kind, _index and _item.  The item of a leg is the item to which it leads.  Missing numbers are
     NaN, and missing kinds are None.

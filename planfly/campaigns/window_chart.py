@@ -1,4 +1,7 @@
-"""Draw the chart of a departure window: the probability of a flyable flight, the wind and the energy by departure."""
+"""Draw the chart of a departure window.
+
+It shows the probability of a flyable flight, the wind and the energy by departure.
+"""
 
 import itertools
 import math
@@ -29,7 +32,10 @@ _MAX_LABELS = 26
 
 
 def draw_window(result: WindowResult) -> Figure:
-    """Draw for each departure the fraction of flyable flights, the deciding rules, the wind and the least energy."""
+    """Draw the chart of each departure.
+
+    It shows the fraction of flyable flights, the deciding rules, the wind and the least energy.
+    """
     with clean_style():
         figure = new_figure(6.4)
         probability = figure.add_axes((0.08, 0.54, 0.89, 0.37))

@@ -1,4 +1,7 @@
-"""Provide the workers of a campaign, on this machine or on a dask cluster, and measure the rate of their flights."""
+"""Provide the workers of a campaign, on this machine or on a dask cluster.
+
+The rate of their flights is measured.
+"""
 
 import contextlib
 import ipaddress

@@ -169,7 +169,10 @@ def aircraft(args: argparse.Namespace) -> int:
 
 
 def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
-    """Return the answer of ``planfly aircraft`` for --json: one aircraft with its numbers, or several without."""
+    """Return the answer of ``planfly aircraft`` for --json.
+
+    It is one aircraft with its numbers, or several without.
+    """
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)
@@ -311,7 +314,10 @@ def _identify(args: argparse.Namespace) -> int:
 
 
 def _print_uncertain_properties(result: "IdentifiedAircraft") -> None:
-    """Print the properties that the logs determine poorly, and the logs or flights that would determine them."""
+    """Print the properties that the logs determine poorly.
+
+    Also print the logs or flights that would determine them.
+    """
     if not result.estimate.dynamics:
         print("  performance only: moments need at least 10 rows of inertial sensors and of outputs per second")
     for log in result.slow:

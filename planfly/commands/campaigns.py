@@ -1,4 +1,7 @@
-"""``planfly campaign`` and ``planfly winds``: find the probability that a mission flies, and its strongest wind."""
+"""``planfly campaign`` and ``planfly winds``.
+
+They find the probability that a mission flies, and its strongest wind.
+"""
 
 import argparse
 import json

@@ -35,7 +35,10 @@ _SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight"
 
 
 def add_mission_or_log_argument(parser: CommandParser) -> None:
-    """Add the argument for a mission, which is then flown, or for a flight log of planfly or another program."""
+    """Add the argument for a mission, which is then flown, or for a flight log.
+
+    The log is from planfly or another program.
+    """
     with_completer(
         parser.add_argument(
             "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"

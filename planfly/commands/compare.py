@@ -31,7 +31,9 @@ def add_compare_parser(command_line: LineParser) -> None:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences of two logs or two campaigns, and draw the differences of logs if a folder is named.
+    """Print the differences of two logs or two campaigns.
+
+    The differences of logs are drawn if a folder is named.
 
     Returns the exit code: 3 if one of the logs is incomplete, otherwise 0.
     """

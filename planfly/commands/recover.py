@@ -21,7 +21,10 @@ def add_recover_parser(command_line: LineParser) -> None:
 
 
 def recover(args: argparse.Namespace) -> int:
-    """Write the readable part of a log as a new log, and return 3; for a complete log, write nothing and return 0."""
+    """Write the readable part of a log as a new log, and return 3.
+
+    For a complete log, write nothing and return 0.
+    """
     from planfly.api import imported
 
     source = Path(args.log)

@@ -108,7 +108,10 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "D
 
 
 def _print_round(finished_round: "Round") -> None:
-    """Print the verdict on a round, the line on returns to launch, the flight model, and the written files."""
+    """Print the verdict on a round, and its files.
+
+    Also print the line on returns to launch, and the flight model.
+    """
     from planfly.terminal.verdict_lines import verdict_lines
 
     print(*verdict_lines(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary), sep="\n")

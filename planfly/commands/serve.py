@@ -1,4 +1,7 @@
-"""``planfly serve``: simulate a vehicle to which ground stations connect to upload missions, arm and follow it."""
+"""``planfly serve``: simulate a vehicle for ground stations.
+
+Stations connect to upload missions, arm and follow it.
+"""
 
 import argparse
 

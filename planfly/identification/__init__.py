@@ -1,1 +1,4 @@
-"""Identify an aircraft from flight logs by estimating a model, which is then written, replayed and shown."""
+"""Identify an aircraft from flight logs by estimating a model.
+
+The model is then written, replayed and shown.
+"""

@@ -1,4 +1,7 @@
-"""Measure mass, inertia, coefficients and motor of a base aircraft on its JSBSim model in level flight at cruise."""
+"""Measure mass, inertia, coefficients and motor of a base aircraft.
+
+They are measured on its JSBSim model in level flight at cruise.
+"""
 
 import math
 from collections.abc import Callable
@@ -198,7 +201,9 @@ class _Probe:
         )
 
     def _vary_axis(self, quantity: Literal["surfaces", "rates"], axis: int, value: float) -> Floats:
-        """Return the coefficients of `_evaluate_coefficients`, (6,), with one deflection or rate that is not 0.
+        """Return the coefficients of `_evaluate_coefficients`, (6,), with one deflection or rate.
+
+        All other deflections and rates are 0.
 
         axis: index of the surface (elevator, aileron, rudder) or rate (p, q, r).
         value: deflection, rad, or rate, rad/s.
@@ -209,7 +214,9 @@ class _Probe:
         return self._evaluate_coefficients(0.0, rates=vector)
 
     def _differentiate(self, function: Callable[[float], Floats], step: float) -> Floats:
-        """Return the derivative at 0 of a function from a number to coefficients, (6,), by a central difference.
+        """Return the derivative at 0 of a function from a number to coefficients, (6,).
+
+        It is a central difference.
 
         step: distance from 0 to either side.
         """
@@ -218,7 +225,9 @@ class _Probe:
     def _evaluate_coefficients(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return the coefficients of drag, lift, side force, roll, pitch and yaw moment with closed throttle, (6,).
+        """Return six coefficients with closed throttle, (6,).
+
+        They are drag, lift, side force, and roll, pitch and yaw moment.
 
         alpha, beta: angles of attack and sideslip, rad.
         rates: angular rates p, q, r, rad/s, zero by default.

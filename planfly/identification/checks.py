@@ -1,4 +1,7 @@
-"""Check an estimate for impossible results, such as reversed outputs, values at their bounds, or a changing mass."""
+"""Check an estimate for impossible results.
+
+Examples are reversed outputs, values at their bounds, and a changing mass.
+"""
 
 import math
 from collections.abc import Sequence
@@ -51,7 +54,10 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
 
 
 def check_commands(records: Sequence[FlightRecord]) -> None:
-    """Raise LogError for a log whose throttle never moves, or whose elevator or aileron hardly moves in turns."""
+    """Raise LogError for a log whose controls hardly move.
+
+    The throttle never moves, or elevator or aileron hardly move in turns.
+    """
     for source in dict.fromkeys(record.source for record in records):
         parts = [record for record in records if record.source == source]
         controls = np.concatenate([part.controls for part in parts])
@@ -70,7 +76,9 @@ def check_commands(records: Sequence[FlightRecord]) -> None:
 
 
 def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
-    """Raise LogError if the mean logged battery power of a log differs too much from the identified aircraft's power.
+    """Raise LogError if a log's mean battery power differs too much from the aircraft's power.
+
+    The aircraft is the identified one.
 
     Without a logged current nothing is checked.
     """

@@ -128,7 +128,9 @@ def make_identification(
     outputs: Mapping[str, ServoOutput],
     until: float | None = None,
 ) -> Identified:
-    """Return the results of an identification, with 512 draws from its estimate, and the cruise speed of the last log.
+    """Return the results of an identification, with 512 draws from its estimate.
+
+    Also return the cruise speed of the last log.
 
     numbers: model values of the base, scaled to the aircraft.
     outputs: servo output of each control.
@@ -278,7 +280,9 @@ def _format_metadata(
 
 
 def select_flown_parameters(log: MotionLog) -> dict[str, float]:
-    """Return the parameters of a log that determine flight behaviour, by ArduPlane's current names and in its units.
+    """Return the parameters of a log that determine flight behaviour.
+
+    They have ArduPlane's current names and units.
 
     The log may use the names of ArduPlane 4.4 and earlier.  Values out of range are left out.
     """

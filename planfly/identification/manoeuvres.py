@@ -1,4 +1,6 @@
-"""Build the mission for an identification, with climbs, glides, level runs at several speeds, and turns.
+"""Build the mission for an identification.
+
+It has climbs, glides, level runs at several speeds, and turns.
 
 The mission is flown in AUTO.  Control doublets cannot be mission items; fly them by hand in FBWA, or with AUTOTUNE.
 """

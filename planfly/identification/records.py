@@ -88,7 +88,9 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the segments of a log with wing-borne flight and without gaps in the data, for an identification.
+    """Return the segments of a log with wing-borne flight and without gaps in the data.
+
+    They are for an identification.
 
     aircraft: base aircraft, whose full deflections are used for the surfaces.
     servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
@@ -306,7 +308,9 @@ def _find_first_output(log: MotionLog, function: int) -> int:
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
-    """Return the servo output of each control, according to the log's SERVOn_* parameters, by the control's name.
+    """Return the servo output of each control, by the control's name.
+
+    It follows from the log's SERVOn_* parameters.
 
     Full travel is the maximum deflection of the base aircraft.  In ArduPlane a longer pulse means roll to the right,
     nose up and yaw to the right; the model's elevator and rudder have the opposite sign.  Elevons are returned as
@@ -356,7 +360,9 @@ def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _read_pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return the minimum, trim and maximum pulse, us, and the sign of a servo output, from the log's SERVOn parameters.
+    """Return the minimum, trim and maximum pulse, us, and the sign of a servo output.
+
+    They are from the log's SERVOn parameters.
 
     The sign is -1 if the output is reversed, otherwise 1.
 

@@ -26,7 +26,9 @@ class ServoOutput:
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """Return the value of the control for each pulse, (n,), constant beyond the shortest and the longest pulse.
+        """Return the value of the control for each pulse, (n,).
+
+        It is constant beyond the shortest and the longest pulse.
 
         pulses: pulse lengths, us, (n,).
 

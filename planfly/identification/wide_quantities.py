@@ -1,4 +1,7 @@
-"""Find the uncertain quantities of an identified aircraft, and flights that would narrow their intervals."""
+"""Find the uncertain quantities of an identified aircraft.
+
+Also find flights that would narrow their intervals.
+"""
 
 from dataclasses import dataclass
 
@@ -39,7 +42,9 @@ Interval = tuple[float, float, float]
 
 
 def wide_quantities(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideQuantity, ...]:
-    """Return those of the two quantities, sink rate and power in level flight, whose 95 % interval is too wide.
+    """Return those of the two quantities whose 95 % interval is too wide.
+
+    The quantities are sink rate and power in level flight.
 
     sink, power: lower bound, estimate and upper bound, in any unit.
     with_current: True if the battery's current was logged, without which no manoeuvre narrows the power's interval.

@@ -1,4 +1,6 @@
-"""``python -m planfly.kernel_units``: compile the units named on standard input, and report their kernels.
+"""``python -m planfly.kernel_units``: compile units, and report their kernels.
+
+The units are named on standard input.
 
 Lines out: ``ready KERNEL`` for each kernel of a unit that is compiled or loaded, then ``done UNIT`` or ``failed UNIT``.
 The process ends as soon as its standard input closes, since no process waits for it any more.

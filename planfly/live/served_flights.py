@@ -65,7 +65,9 @@ _MAX_TEXTS_PER_VERDICT = 4
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """Options of ``planfly serve``; the link's process and the flight process both read the files that they name.
+    """Options of ``planfly serve``.
+
+    The link's process and the flight process both read the files that they name.
 
     mission: path of a mission file, or "".
     speed: multiple of real time.
@@ -149,7 +151,10 @@ def run_flight_process(connection: Connection, options: ServeOptions) -> None:
 
 
 class ServedFlights:
-    """Factory of a flight process: it prepares and judges missions in the served scenario, and opens flight logs."""
+    """Factory of a flight process.
+
+    It prepares and judges missions in the served scenario, and opens flight logs.
+    """
 
     def __init__(self, options: ServeOptions) -> None:
         """Load the scenario of the options, with its UAV."""

@@ -1,4 +1,6 @@
-"""Find out without a flight why a safe plan is expected to fail in more than one of twenty dispersed flights.
+"""Find out without a flight why a safe plan is expected to fail in dispersed flights.
+
+A failure of more than one flight in twenty is reported.
 
 A safe plan meets the limits of its scenario in the wind of the scenario and over the heights of its map.  Two causes of
 failures can be found from the plan alone: limits that are looser than the limits of the aircraft or its autopilot, and

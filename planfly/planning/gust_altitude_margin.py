@@ -1,4 +1,6 @@
-"""Give a plan the altitude margin that it needs because gusts can exceed the climb or sink rate of the aircraft.
+"""Give a plan the altitude margin that it needs in gusts.
+
+Gusts can exceed the climb or sink rate of the aircraft.
 
 In a downdraft planfly's guidance descends rather than stall; in an updraft ArduPlane and PX4 climb rather than exceed
 their airspeed.  A plan is safe only if each leg has a margin for the altitude lost or gained in a gust, above its
@@ -148,7 +150,9 @@ def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the kinds of gusts to consider, each with the function that returns its vertical displacement, m.
+    """Return the kinds of gusts to consider, each with a function.
+
+    The function returns the gust's vertical displacement, m.
 
     The function's arguments are the climb or sink rate that the aircraft holds in reserve, m/s, and the turbulence.
     Updrafts are considered only if the scenario has zones or a maximum height.
@@ -205,7 +209,9 @@ def _with_margin_at_threats(limits: Limits) -> Limits:
 
 
 def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
-    """Return True if a plan exceeds the ceiling or the maximum height after it is raised; False for a change of 0.
+    """Return True if a raised plan exceeds the ceiling or the maximum height.
+
+    Return False for a change of 0.
 
     The ends of the plan are not raised, unless it has no other waypoints.
 
@@ -223,7 +229,9 @@ def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
 
 
 def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
-    """Return limits for a search for paths with the margin that gusts require at the given plan's altitude.
+    """Return limits for a search for paths with the margin that gusts require.
+
+    The margin is that at the given plan's altitude.
 
     unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
@@ -247,7 +255,9 @@ def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB
 
 
 def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
-    """Return limits for a search for alternatives to a safe plan: the strictest limits for gusts that the plan meets.
+    """Return limits for a search for alternatives to a safe plan.
+
+    They are the strictest limits for gusts that the plan meets.
 
     The limits with a margin for gusts at the ground, missiles and zones are tried first, then those with a margin at
     the ground only.  If the plan meets none of them, or gusts do not displace the aircraft, the limits have no such
@@ -287,7 +297,9 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
-    """Return for each kind of gust and hazard the shortfall at the place where the aircraft gets deepest into it.
+    """Return the shortfall for each kind of gust and hazard.
+
+    It is that at the place where the aircraft gets deepest into the hazard.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.

@@ -110,7 +110,10 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
 
 
 def _is_safe_in_gusts(plan: Plan, uav: Uav) -> bool:
-    """Return True if at most `MAX_EXPECTED_ORBITS` orbits are expected, and all corners stay in the corridor."""
+    """Return True if at most `MAX_EXPECTED_ORBITS` orbits are expected.
+
+    All corners must stay in the corridor, too.
+    """
     if expected_orbits(plan, uav.autopilot, uav.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_corner_excursions(plan, uav), default=0.0) <= _plan_corridor_half_width(plan, uav)

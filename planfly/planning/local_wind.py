@@ -91,7 +91,10 @@ def ensure_local_wind(plan: Plan, uav: Uav, search: Callable[[Uav], Plan] | None
 
 
 def _plan_requirements(plan: Plan, uav: Uav) -> RouteRequirements:
-    """Return the route requirements of a plan's mission.  Raises ForecastError as `ensure_local_wind` does."""
+    """Return the route requirements of a plan's mission.
+
+    Raises ForecastError as `ensure_local_wind` does.
+    """
     return route_requirements(make_setup(plan.scenario, uav, mission_of_plan(plan, uav), plan.seed, plan=plan))
 
 

@@ -109,7 +109,9 @@ def problem_name(threats: int) -> str:
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return the probability of at least one kill or detection on a path, with its points treated as independent.
+    """Return the probability of at least one kill or detection on a path.
+
+    The points of the path are treated as independent.
 
     The points are the path's six per leg, and its end.
     The probability at a point is min(1, (scale / d)^4) for a threat at distance d within its radius.  The paper's sums
@@ -381,7 +383,10 @@ def _csv_text(columns: Sequence[str], rows: Any) -> str:
 
 
 def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
-    """Draw the paper's figures 5-8 (paths) and 9-12 (encodings), and the convergence over generations, as PNG files."""
+    """Draw the paper's figures 5-8 (paths) and 9-12 (encodings) as PNG files.
+
+    The convergence over generations is drawn, too.
+    """
     from logs.views.drawing import write_png
     from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 

@@ -1,4 +1,7 @@
-"""Make certificates that last as long as a process and prove that a connection belongs to this process."""
+"""Make certificates that prove that a connection belongs to this process.
+
+They last as long as the process.
+"""
 
 from datetime import UTC, datetime
 from typing import NamedTuple

@@ -86,7 +86,10 @@ def _yield_frames(film: MovieFrames) -> Iterator[Image.Image]:
 
 
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
-    """Return a frame with each colour replaced by the nearest colour of a palette, without transparent pixels."""
+    """Return a frame with each colour replaced by the nearest colour of a palette.
+
+    Transparent pixels of the palette are not used.
+    """
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
     opaque = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))

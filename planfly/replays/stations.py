@@ -98,7 +98,10 @@ class _Player:
                 self._link.send(piece, peer)
 
     def wait(self, timeout: float, should_stop: ShouldStop) -> None:
-        """Send heartbeats until a station answers, `timeout` seconds have passed, or `should_stop` returns True."""
+        """Send heartbeats until a station answers.
+
+        The wait ends after `timeout` seconds, or when `should_stop` returns True.
+        """
         end = self._link.clock() + timeout
         while not self._link.peers and self._link.clock() < end and not should_stop():
             self.step(pause=0.05)

@@ -1,4 +1,6 @@
-"""Fly the worst returns to launch again by the ArduPlane program, to check planfly's simulated ArduPlane.
+"""Fly the worst returns to launch again by the ArduPlane program.
+
+This checks planfly's simulated ArduPlane.
 
 Each return is a separate flight, with the same mission as in `planfly.rtl.jsbsim_returns`.  The program's result
 replaces the simulated result only if it is worse; it never improves a judgement.
@@ -152,7 +154,10 @@ class ProgramReturns:
 
 
 def check_is_arduplane(program: Path) -> None:
-    """Raise ArgumentError if a program is not an ArduPlane executable; planfly flies returns only with ArduPlane."""
+    """Raise ArgumentError if a program is not an ArduPlane executable.
+
+    planfly flies returns only with ArduPlane.
+    """
     autopilot_class = find_program_class(program)
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected an ArduPlane executable; returns by a real {autopilot_class.title} are not supported"
@@ -160,7 +165,10 @@ def check_is_arduplane(program: Path) -> None:
 
 
 def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
-    """Raise ArgumentError if the returns to launch are not simulated with ArduPlane, which its program could check."""
+    """Raise ArgumentError if the returns to launch are not simulated with ArduPlane.
+
+    Its program can only check such returns.
+    """
     if not isinstance(world.autopilot, ArduPlane):
         allowed = f"the program of ArduPlane cannot check the returns of {world.autopilot.title}"
         raise ArgumentError.of_argument("sitl", str(program), allowed)
@@ -169,7 +177,9 @@ def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
 def choose_worst_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[SimulatedReturn, int]]:
-    """Choose at most `points` returns for the program to fly, the worst first, each with the index of its start.
+    """Choose at most `points` returns for the program to fly, the worst first.
+
+    Each has the index of its start.
 
     Starts that the program cannot reach safely are skipped.  Returns from neighbouring starts are similar, so starts
     closer to a chosen start than half the path length divided by `points` are skipped, too.
@@ -209,7 +219,9 @@ def choose_worst_returns(
 def fly_with_autopilot(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, max_returns: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `max_returns` of the worst returns to launch with the real ArduPlane (SITL), and judge them.
+    """Fly at most `max_returns` of the worst returns to launch with the real ArduPlane.
+
+    The returns are then judged.
 
     The wind is the mean wind, and the navigation is exact.
 
@@ -320,7 +332,9 @@ def _cut_at_nearest_point(point: tuple[float, float, float], position: Floats) -
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Return the target of a flown return to launch: the one at which the path ends, or for which it heads at the end.
+    """Return the target of a flown return to launch.
+
+    The path ends at this target, or heads for it at its end.
 
     All possible targets are tried.  If none fits, the target of the simulated ArduPlane is returned.
 

@@ -79,7 +79,9 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
 def _feed_process(
     process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
 ) -> None:
-    """Send unit names to a process, one after another, and queue the lines that it prints; run in a thread.
+    """Send unit names to a process, one after another, and queue the lines that it prints.
+
+    Run in a thread.
 
     `_END_OF_OUTPUT` is queued when no unit remains or the process has died.
 

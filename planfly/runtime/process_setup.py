@@ -23,7 +23,9 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Make garbage collection rare in this process and its children, and limit linear algebra to one thread.
+    """Make garbage collection rare in this process and its children.
+
+    Linear algebra is limited to one thread.
 
     Call this function before NumPy is imported.
 
@@ -75,7 +77,10 @@ def check_script_guard(workers: "Iterable[BaseProcess]") -> None:
 
 
 def guard_imports() -> None:
-    """If the address space of this process is limited, make imports fail early for modules that do not fit into it."""
+    """Make imports fail early for modules that do not fit into this process's address space.
+
+    This is only done if the address space is limited.
+    """
     limit = address_space_limit()
     if limit is None:
         return

@@ -37,7 +37,9 @@ def _media_type(name: str) -> str:
 
 
 def make_app(server: Server, port: int) -> App:
-    """Return the web application: page files, the websocket of the session, and the guard in front of both.
+    """Return the web application.
+
+    It has the page files, the websocket of the session, and the guard in front of both.
 
     port: port on which the application listens.
     """

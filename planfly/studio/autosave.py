@@ -105,7 +105,10 @@ def autosave_text(
 
 
 def settings_data(context: EditContext) -> Json:
-    """Return plain data of an editing context: name of the scenario, its settings, and the changed parameters."""
+    """Return plain data of an editing context.
+
+    They are the name of the scenario, its settings, and the changed parameters.
+    """
     spec = context.scenario.to_json()
     # An area made around a mission is not saved; it is made again when the mission is restored.
     names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
@@ -231,7 +234,9 @@ def sibling_autosave_path(file: Path, opened_mission: Mission) -> Path:
 def restore_settings(
     context: EditContext, data: Json, options: MissionOptions, *, file_autopilot: bool = False
 ) -> tuple[EditContext, tuple[str, ...]]:
-    """Return the editing context with the saved settings, and texts on saved settings that were not restored.
+    """Return the editing context with the saved settings.
+
+    Also return texts on saved settings that were not restored.
 
     The context is `context` itself if the settings do not differ, or belong to another scenario.
 
@@ -305,7 +310,10 @@ def _is_same_value(first: object, second: object) -> bool:
 
 
 def _value_text(value: object) -> str:
-    """Return a number or a text of a scenario as text; a path is reduced to its name, and None becomes "none"."""
+    """Return a number or a text of a scenario as text.
+
+    A path is reduced to its name, and None becomes "none".
+    """
     return "none" if value is None else Path(value).name if isinstance(value, str) else f"{value:g}"
 
 

@@ -77,7 +77,9 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Return a flight's result for each rule and place; the worst result if the place was flown repeatedly.
+    """Return a flight's result for each rule and place.
+
+    It is the worst result if the place was flown repeatedly.
 
     route: route of the mission.
     findings: findings of the flight's verdict.
@@ -312,7 +314,9 @@ def _quantity_name(rule: str) -> str:
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return lines on changed values: first of failures that continue, then of the place closest to each rule's limit.
+    """Return lines on changed values.
+
+    Failures that continue come first, then the place closest to each rule's limit.
 
     At most `_MAX_VALUE_CHANGES` lines of each of the two are returned; the latter with the largest changes first.
     """

@@ -1,4 +1,7 @@
-"""Limit the number, lifetime and message size of connections to the studio that have not given a token."""
+"""Limit connections to the studio that have not given a token.
+
+Their number, lifetime and message size are limited.
+"""
 
 import asyncio
 import itertools
@@ -43,7 +46,10 @@ class _UnknownConnection:
 
 
 class ShortLivedHttpProtocol(_UnknownConnection, H11Protocol):
-    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`, so that idle connections do not accumulate."""
+    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`.
+
+    Idle connections then do not accumulate.
+    """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Register the connection, and schedule its closing in case no websocket replaces HTTP by then."""

@@ -1,4 +1,7 @@
-"""Open documents in the studio, and save the edited mission, with a list of the contents that each format loses."""
+"""Open documents in the studio, and save the edited mission.
+
+The contents that each format loses are listed.
+"""
 
 import contextlib
 import json
@@ -198,7 +201,9 @@ def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> Fligh
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
-    """Return a placeholder plan: the straight line from start to destination, which no check has certified.
+    """Return a placeholder plan, the straight line from start to destination.
+
+    No check has certified this plan.
 
     seed: seed that the plan states.
     """
@@ -219,7 +224,10 @@ def planned_mission(plan: Plan, uav: Uav) -> Mission:
 
 @dataclass(frozen=True, slots=True)
 class SavedFile:
-    """Name and bytes of a saved file, and a line for each part of the mission that the format cannot store."""
+    """Name and bytes of a saved file.
+
+    It has a line for each part of the mission that the format cannot store.
+    """
 
     name: str
     data: bytes
@@ -286,7 +294,9 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
 
 
 def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str, ...]:
-    """Return lines on settings and parameters that were changed in the studio, and that a mission file cannot store.
+    """Return lines on changed settings and parameters that a mission file cannot store.
+
+    They were changed in the studio.
 
     opened_setup: setup as opened, with the settings before the changes.
     """

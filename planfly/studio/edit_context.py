@@ -1,4 +1,7 @@
-"""Store the settings with which an edited mission is judged, and compute its route while it is dragged."""
+"""Store the settings with which an edited mission is judged.
+
+Its route is computed while it is dragged.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -19,7 +19,9 @@ _SEARCHED_BYTES = 2**20
 
 
 def folder_message(folder: Path | None) -> Json:
-    """Return a message for the page with the missions, plans, logs and parameter files of a folder, by name.
+    """Return a message for the page with the files of a folder, by name.
+
+    Files are missions, plans, logs and parameter files.
 
     At most `_MAX_FILES` are listed.  Links to files in other folders are left out, and so are text files and JSON
     documents without a mission.  The list is empty for no folder, and for one that cannot be read.

@@ -70,7 +70,10 @@ def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
 
 
 class Guard:
-    """ASGI application that refuses a request, or forwards it to another application; all answers get `HEADERS`."""
+    """ASGI application that refuses a request, or forwards it to another application.
+
+    All answers get `HEADERS`.
+    """
 
     def __init__(self, app: App, port: int) -> None:
         """Guard an application that listens on `port`."""

@@ -1,4 +1,6 @@
-"""Judge the geometry of the legs and corners near a moved item, with the same result as for the whole route.
+"""Judge the geometry of the legs and corners near a moved item.
+
+The result is the same as for the whole route.
 
 A window is a judged part of the route.
 
@@ -104,7 +106,9 @@ def judge_windows(
 
 
 def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before_part: bool) -> tuple[Route, int]:
-    """Extend a part of a route by legs with the highest airspeeds and the strongest wind of the whole route.
+    """Extend a part of a route by the legs with the most extreme conditions of the whole route.
+
+    These are the highest airspeeds and the strongest wind.
 
     Returns the extended part, and the number of waypoints added before the part.
 
@@ -171,7 +175,9 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
-    """Return first and last waypoint of a span extended to both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
+    """Return first and last waypoint of a span extended to both sides.
+
+    It is extended by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
 
     The extension ends at the ends of the route.  A loiter is included completely or not at all.
 

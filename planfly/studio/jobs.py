@@ -1,4 +1,7 @@
-"""Send flights, searches for paths, RTL trials and campaigns to the two worker processes, and handle their results."""
+"""Send tasks to the two worker processes, and handle their results.
+
+Tasks are flights, searches for paths, RTL trials and campaigns.
+"""
 
 import pickle
 import time
@@ -77,7 +80,10 @@ class Jobs:
     _is_first_path_pending: bool = False
 
     def start_first_task(self, session: Session) -> None:
-        """Start a flight of the opened mission, or a search for a path if a scenario was opened and not edited."""
+        """Start a flight of the opened mission.
+
+        If a scenario was opened and not edited, start a search for a path.
+        """
         if session.document.to_plan and not session.is_edited:
             self._is_first_path_pending = True
             self._submit_task(
@@ -231,7 +237,9 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Handle a worker's answer: store a result, start a follow-up task, and return the messages for the pages.
+        """Handle a worker's answer, and return the messages for the pages.
+
+        A result is stored, and a follow-up task is started.
 
         For a task that another task has replaced, this is only the message that the task has stopped.  Progress gives
         at most one message in `_REPORT_INTERVAL_S`.
@@ -262,7 +270,9 @@ class Jobs:
         return [result, *(following.message for following in [self._active.get(worker)] if following is not None)]
 
     def _stopped_message(self, name: str) -> Json:
-        """Return the message that a task has ended without a result; the end of a search also ends the first search.
+        """Return the message that a task has ended without a result.
+
+        The end of a search also ends the first search.
 
         name: kind of the task, as in `_ActiveTask`.
         """
@@ -311,7 +321,10 @@ class Jobs:
         return message
 
     def take_initial_plan(self, session: Session) -> bool:
-        """Return True, once, when the first path of the opened scenario has arrived and can become the mission."""
+        """Return True, once, when the first path of the opened scenario has arrived.
+
+        This path can become the mission.
+        """
         has_path = self._is_first_path_pending and bool(session.plans[0])
         if has_path:
             self._is_first_path_pending = False

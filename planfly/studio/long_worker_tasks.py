@@ -115,7 +115,9 @@ def _campaign_base(context: EditContext, mission: Mission) -> CampaignBase:
 
 
 def run_battery_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the smallest battery for a mission and its returns to launch, and return the answer as page data.
+    """Find the smallest battery for a mission and its returns to launch.
+
+    The answer is page data.
 
     payload: editing context, and mission.
     """
@@ -128,7 +130,9 @@ def run_battery_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
 
 
 def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the volumes and the ground risk class of a mission by SORA 2.5, and return the answer as page data.
+    """Find the volumes and the ground risk class of a mission by SORA 2.5.
+
+    The answer is page data.
 
     payload: editing context, and mission.
     """
@@ -141,7 +145,9 @@ def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance)
 
 
 def run_window_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the take-off times at which a mission is flyable in its forecast, and return the answer as page data.
+    """Find the take-off times at which a mission is flyable in its forecast.
+
+    The answer is page data.
 
     payload: editing context, and mission.
 

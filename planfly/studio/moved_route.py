@@ -1,4 +1,6 @@
-"""Update the route of a mission after a few waypoints were moved, by replacing rows of the previous route.
+"""Update the route of a mission after a few waypoints were moved.
+
+Rows of the previous route are replaced.
 
 Laying out all items of a long mission takes longer than judging the legs around one item.
 """

@@ -95,7 +95,10 @@ class Page:
 
 
 class Server:
-    """Server of the studio, which connects pages, session and worker processes; uvicorn serves the sockets."""
+    """Server of the studio, which connects pages, session and worker processes.
+
+    uvicorn serves the sockets.
+    """
 
     def __init__(self, session: Session, token: str, autosave_file: Path | None, folder: Path | None) -> None:
         """Prepare the server.
@@ -153,7 +156,10 @@ class Server:
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_task(self, task: Task | None) -> bytes:
-        """Pickle a task in the judging thread, where judging cannot change caches of the pickled objects meanwhile."""
+        """Pickle a task in the judging thread.
+
+        Judging cannot change caches of the pickled objects there meanwhile.
+        """
         return self._judge_thread.submit(pickle.dumps, task).result()
 
     # ------------------------------------------------------------------
@@ -237,7 +243,10 @@ class Server:
                 await (page.socket.send_bytes(frame) if isinstance(frame, bytes) else page.socket.send_text(frame))
 
     async def _judge_drags(self, page: Page) -> None:
-        """Judge the newest position of a page's drag and send the result, one position at a time, until cancelled."""
+        """Judge the newest position of a page's drag and send the result, until cancelled.
+
+        One position is judged at a time.
+        """
         while True:
             await page.drag_received.wait()
             page.drag_received.clear()
@@ -349,7 +358,9 @@ class Server:
             page.send({"kind": "fault", "text": internal_text(error)})
 
     async def _change_session(self, message: messages.Message) -> None:
-        """Change the session as a message requests, send the changed mission to every page, and start its flight.
+        """Change the session as a message requests.
+
+        The changed mission is sent to every page, and its flight is started.
 
         If the message changes nothing, nothing is sent or started.
         """

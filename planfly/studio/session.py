@@ -301,7 +301,9 @@ class Session:
         self._add_to_history(mission, text, tuple(parameter_changes))
 
     def _context_with_parameters(self, values: Mapping[str, float | None]) -> EditContext:
-        """Return the editing context with other parameter values; names that the autopilot does not have are ignored.
+        """Return the editing context with other parameter values.
+
+        Names that the autopilot does not have are ignored.
 
         values: value by name; None resets a parameter that was set in the studio.
         """
@@ -559,7 +561,10 @@ class Session:
 
     @property
     def needs_autosave(self) -> bool:
-        """True if the session has edits, other settings than the opened document, or an autosave to be replaced."""
+        """True if the session has something to save.
+
+        That is an edit, other settings than the opened document, or an autosave to be replaced.
+        """
         has_notes = self.must_autosave or bool(self.unused_text)
         return self.is_edited or has_notes or self.context.scenario is not self.document.setup.scenario
 

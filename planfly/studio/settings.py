@@ -126,7 +126,9 @@ def autopilot_parameters(scenario: Scenario, uav: Uav) -> dict[str, dict[str, st
 
 
 def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
-    """Return an error about changed settings, rewritten with the labels that the settings have on the page.
+    """Return an error about changed settings in the words of the page.
+
+    The settings have their labels on the page.
 
     The scenario's name, which may be the name of the mission file, is omitted.
 
@@ -186,7 +188,9 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
 
 
 def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, settings: Settings) -> ChangedParameters:
-    """Return the changed parameters after a change of settings, checked against the autopilot of a scenario.
+    """Return the changed parameters after a change of settings.
+
+    They are checked against the autopilot of a scenario.
 
     A change of the autopilot discards all parameters. A file replaces all parameters; a single parameter replaces only
     its own value.
@@ -284,7 +288,9 @@ def settings_json(
 
 
 def changed_settings(opened: Mapping[str, Any], current: Mapping[str, Any]) -> list[str]:
-    """Return the labels, in lower case, of the settings whose values differ, except the autopilot's parameters.
+    """Return the labels, in lower case, of the settings whose values differ.
+
+    The autopilot's parameters are left out.
 
     opened, current: settings as page data (`settings_json`).
     """

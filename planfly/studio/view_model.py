@@ -1,4 +1,7 @@
-"""Convert the world, the mission with its states, and the profile to the data that the page draws, in m."""
+"""Convert the world, the mission with its states, and the profile to page data.
+
+The page draws these data, which are in m.
+"""
 
 import math
 from collections.abc import Sequence
@@ -196,7 +199,10 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def commands_json(mission: Mission) -> list[Json]:
-    """Return page data of the items without a position, such as changes of speed and jumps, which cannot be edited."""
+    """Return page data of the items without a position, which cannot be edited.
+
+    Examples are changes of speed and jumps.
+    """
     places = set(movable_indices(mission))
     return [
         {"k": k, "seq": item.seq, "text": _command_text(item)}
@@ -230,7 +236,9 @@ def _command_text(item: MissionItem) -> str:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Return page data of the waypoints `first` to `last`: their positions, m, and the indices of their items.
+    """Return page data of the waypoints `first` to `last`.
+
+    They are positions, m, and the indices of their items.
 
     The index of an item is its position in the mission's list; -1 for a waypoint without an item.
     """
@@ -252,7 +260,9 @@ def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return page data of the legs and corners between two waypoints, each as its state, text and closeness.
+    """Return page data of the legs and corners between two waypoints.
+
+    Each has its state, text and closeness.
 
     first, last: numbers of the two waypoints in the route.
     """
@@ -289,7 +299,9 @@ def verdict_page_data(verdict: Verdict) -> Json:
 
 
 def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[Json]:
-    """Return page data of the findings to list, each as in ``verdict.json``, with number, title, state and offers.
+    """Return page data of the findings to list, each as in ``verdict.json``.
+
+    Number, title, state and offers are added.
 
     The offers of a finding are its suggestions.  Listed are the failed and undecided findings, then the finding closest
     to its limit for each rule.
@@ -323,7 +335,10 @@ def can_apply_in_studio(suggestion: Suggestion) -> bool:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return page data of the profile along the route: terrain, waypoints, and cross-sections of threats and zones."""
+    """Return page data of the profile along the route.
+
+    It has terrain, waypoints, and cross-sections of threats and zones.
+    """
     route = setup.route.positions
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))

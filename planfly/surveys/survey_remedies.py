@@ -1,4 +1,7 @@
-"""Find remedies for surveys with photo lines that cannot be used; each remedy is flown before it is suggested."""
+"""Find remedies for surveys with photo lines that cannot be used.
+
+Each remedy is flown before it is suggested.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -185,7 +188,10 @@ def _usable_parts(verdict: Verdict) -> list[float]:
 
 
 def _line_findings(verdict: Verdict) -> list[Finding]:
-    """Return the findings on the photo lines of a flight, except the findings on the overlap of their photos."""
+    """Return the findings on the photo lines of a flight.
+
+    Findings on the overlap of their photos are left out.
+    """
     return [finding for finding in verdict.findings if finding.rule == "survey" and finding.check in ("", GROUND_PATH)]
 
 
@@ -254,13 +260,18 @@ class _Trials:
     # One flight.
 
     def _changed_setup(self, mission: Mission, uav: Uav) -> FlightSetup:
-        """Return the setup of a changed mission with a UAV; vertical legs are accepted, as in the original mission."""
+        """Return the setup of a changed mission with a UAV.
+
+        Vertical legs are accepted, as in the original mission.
+        """
         scenario = self._setup.scenario
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, uav, mission, self._setup.seed, placed=placed)
 
     def _fly_trial(self, mission: Mission, uav: Uav, description: str) -> _TrialFlight | None:
-        """Fly a changed mission, and store it as `nearest` if it came closer to passing than all flights before.
+        """Fly a changed mission.
+
+        Store it as `nearest` if it came closer to passing than all flights before.
 
         description: description of the change.
         Returns verdict, mission and path length (m), or None for a mission without a valid route.
@@ -300,7 +311,9 @@ class _Trials:
         return self._fly_trial(mission, self._uav, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
-        """Return True if all lines are usable in a flight, and no other rule fails newly or clearly worse than before.
+        """Return True if all lines are usable in a flight.
+
+        No other rule may fail newly or clearly worse than before.
 
         A failure may become larger by at most the `scale` of its rule, the smallest noticeable difference.
         """
@@ -693,7 +706,9 @@ class _Trials:
 
 
 def missing_height(measure: OverlapMeasure, tolerance: float = 0.0) -> float:
-    """Return by how much photo lines must be raised for the lowest photos to have the required overlaps, m.
+    """Return by how much photo lines must be raised for the required overlaps, m.
+
+    The lowest photos decide.
 
     The distances between photos and between lines stay as flown.  Returns 0 if the overlaps are large enough.
 
@@ -710,7 +725,9 @@ def missing_height(measure: OverlapMeasure, tolerance: float = 0.0) -> float:
 
 
 def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:
-    """Return a setup's mission with gates (CONDITION_GATE) at the ends of photo lines with turn-around distances.
+    """Return a setup's mission with gates (CONDITION_GATE) at the ends of photo lines.
+
+    Only lines with turn-around distances get gates.
 
     The mission is unchanged for an autopilot without gates.
     """

@@ -92,7 +92,9 @@ def survey_text(survey: Survey) -> str:
 
 
 def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> tuple[str, ...]:
-    """Return texts on the photo overlap along and across the lines, or one text with the reason why it is not judged.
+    """Return texts on the photo overlap along and across the lines.
+
+    If it is not judged, return one text with the reason.
 
     measure: measured overlap; None if the camera is unknown.
     is_flown: True if at least one line was flown.
@@ -160,7 +162,10 @@ def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
 
 
 def slow_camera_text(measure: OverlapMeasure) -> str:
-    """Return a text on a camera that is too slow for the stated distance between photos, with its own distance."""
+    """Return a text on a camera that is too slow for the stated distance between photos.
+
+    The text has the camera's own distance.
+    """
     return (
         f"the camera is too slow for the distance between photos: one every {measure.camera.interval:g} s, or"
         f" {measure.photo_spacing:.0f} m"
@@ -177,7 +182,9 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Return a text on the length lost at the ends of the lines, which indicates the needed turn-around distance.
+    """Return a text on the length lost at the ends of the lines.
+
+    It indicates the needed turn-around distance.
 
     If no line has a usable part, the text states that instead.
 

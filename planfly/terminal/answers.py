@@ -33,7 +33,10 @@ class TrimEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ModeEntry:
-    """A dynamic mode in cruise, with its root; of a conjugate pair, the root with the positive imaginary part."""
+    """A dynamic mode in cruise, with its root.
+
+    Of a conjugate pair, the root has the positive imaginary part.
+    """
 
     name: str
     root_real_1_s: float
@@ -295,7 +298,10 @@ class WindDirection:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CalmFlights:
-    """Flights in the weakest wind that was flown, of the directions in which the mission fails even in calm air."""
+    """Flights in the weakest wind that was flown.
+
+    They are from the directions in which the mission fails even in calm air.
+    """
 
     speed_mps: float
     flights: int

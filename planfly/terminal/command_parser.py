@@ -1,4 +1,7 @@
-"""Parse the command line, report bad usage in one line, suggest the intended option, and group the help."""
+"""Parse the command line, and report bad usage in one line.
+
+The intended option is suggested, and the help is grouped.
+"""
 
 import argparse
 import os

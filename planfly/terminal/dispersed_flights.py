@@ -1,4 +1,7 @@
-"""Fly a finished plan with the default dispersions, and state how many flights are flyable (``--flights N``)."""
+"""Fly a finished plan with the default dispersions (``--flights N``).
+
+The number of flyable flights is stated.
+"""
 
 import argparse
 from typing import TYPE_CHECKING

@@ -27,7 +27,9 @@ from world.elevation_formats import EMBEDDED, SUFFIXES
 
 
 def given_options(args: argparse.Namespace, function: Callable[..., object], /, **overrides: Any) -> dict[str, Any]:
-    """Return the given options that are keywords of one function, for a command that calls several of the API.
+    """Return the given options that are keywords of one function.
+
+    It is for a command that calls several functions of the API.
 
     A command that calls one function passes `args.options`, see `planfly.terminal.command_parser.LineParser`.
 

@@ -1,4 +1,7 @@
-"""Output of a command: text on standard output, also after a closed pipe, progress, and the answer as JSON."""
+"""Output of a command: text, progress, and the answer as JSON.
+
+Text goes to standard output, also after a closed pipe.
+"""
 
 import argparse
 import contextlib
@@ -413,7 +416,9 @@ class _Bar:
 
 
 class _Lines:
-    """Progress lines of a stage if standard error is no terminal: at the start, at intervals, and at the end.
+    """Progress lines of a stage if standard error is no terminal.
+
+    They are printed at the start, at intervals, and at the end.
 
     A stage that fails within the first second, as for refused input, prints no line.
     """
@@ -506,7 +511,9 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 @contextlib.contextmanager
 def redirect_output(args: argparse.Namespace) -> Iterator[None]:
-    """During this block, discard printed lines with --quiet, or print them on standard error with ``--json -``.
+    """During this block, discard printed lines with --quiet.
+
+    With ``--json -``, print them on standard error.
 
     Progress is not shown with --quiet.  Raises PlanflyError if the file of the JSON answer or of the JUnit report
     exists and must not be overwritten, or if another argument names the same file.  A resumed command replaces the

@@ -117,7 +117,10 @@ class ByProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlideEntry:
-    """Consecutive glides that reach the same place; the numbers are those of the glide with the least height left."""
+    """Consecutive glides that reach the same place.
+
+    The numbers are those of the glide with the least height left.
+    """
 
     first_s: float
     last_s: float
@@ -321,7 +324,10 @@ def glides_entry(result: ReturnsResult) -> GlidesEntry:
 
 
 def return_range_entry(result: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
-    """Return the JSON entry of consecutive returns with the same outcome; its numbers are those of the worst return."""
+    """Return the JSON entry of consecutive returns with the same outcome.
+
+    Its numbers are those of the worst return.
+    """
     worst_return, scenario, round_to_tenths = return_range.worst, result.setup.scenario, _round_to_tenths
     return ReturnEntry(
         first_s=round(return_range.first, 2),

@@ -31,7 +31,9 @@ _COMPILER_PACKAGES = ("numba", "llvmlite")
 
 @contextlib.contextmanager
 def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
-    """During this block, raise `Interrupted` for SIGINT and SIGTERM, and end the process by force if it does not end.
+    """During this block, raise `Interrupted` for SIGINT and SIGTERM.
+
+    The process is ended by force if it does not end.
 
     grace: time after a signal at which the process is ended by force, s.
 

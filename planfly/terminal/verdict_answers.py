@@ -18,7 +18,10 @@ STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_s
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReturnCounts:
-    """Returns from some 50 points of a flight, which do not decide the verdict; `planfly returns` judges them all."""
+    """Returns from some 50 points of a flight, which do not decide the verdict.
+
+    `planfly returns` judges them all.
+    """
 
     line: str
     """Summary of the returns, or the reason why none is judged."""

@@ -108,7 +108,10 @@ def apply_suggestion(
 
 
 def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
-    """Return the failed and undecided findings of a verdict, as {(rule, place): True if failed, False if undecided}."""
+    """Return the failed and undecided findings of a verdict by (rule, place).
+
+    The value is True for a failed and False for an undecided finding.
+    """
     open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
     return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 
@@ -154,7 +157,10 @@ class _Choice:
 
 
 class _EditedMission:
-    """Mission whose items are moved one by one, with the route and the route requirements before the moves."""
+    """Mission whose items are moved one by one.
+
+    It has the route and the route requirements before the moves.
+    """
 
     def __init__(
         self, context: MissionContext, judged: JudgedMission, choice: _Choice, moved_items: frozenset[int]
@@ -275,7 +281,10 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg to the wanted change of altitude, by moving one or both of its ends."""
+    """Reduce the climb or descent of a leg to the wanted change of altitude.
+
+    One or both of its ends are moved.
+    """
     leg = _changed_leg(change, edited.route)
     excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
@@ -306,7 +315,9 @@ def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) 
 
 
 def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Move a waypoint towards the line between its neighbours, as far as its turn needs to become gentle enough.
+    """Move a waypoint towards the line between its neighbours.
+
+    It is moved as far as its turn needs to become gentle enough.
 
     The waypoint is not moved if it is an end of the route, or if no move makes the turn gentle enough.
     """

@@ -156,7 +156,9 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def overridden_texts(numbers: Mapping[str, float | None], parameters: AircraftParameters) -> list[str]:
-    """Return a text for each parameter of a file that is not used because the data sheet states another value.
+    """Return a text for each parameter of a file that is not used.
+
+    The data sheet states another value.
 
     numbers: numbers of the data sheet by keyword, in the units of the options; None or 0 if not stated.
 
@@ -400,7 +402,9 @@ def climb_deviation(sized: SizedAircraft) -> float:
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Return climb angle (rad), descent angle (rad), top speed (m/s) and logarithm of the cruise power (W), (4,).
+    """Return four numbers of performance, (4,).
+
+    They are climb angle (rad), descent angle (rad), top speed (m/s) and logarithm of the cruise power (W).
 
     The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
     in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.
@@ -732,7 +736,9 @@ def arduplane_parameters_text(
 
 
 def servo_text(aircraft: Aircraft, performance: Performance) -> str:
-    """Return the text of ``ardupilot.toml``: the servo output and pulses of each surface and of the throttle.
+    """Return the text of ``ardupilot.toml``.
+
+    It has the servo output and pulses of each surface and of the throttle.
 
     Elevons and V-tails are mixed within the model.
     """
@@ -815,7 +821,9 @@ def missed_value_lines(
 
 
 def _climb_names(stated: AircraftParameters) -> list[str]:
-    """Return the names that a file uses for TECS_CLMB_MAX and THR_MAX, if the climb rate is not at full throttle.
+    """Return the names that a file uses for TECS_CLMB_MAX and THR_MAX.
+
+    They are returned if the climb rate is not at full throttle.
 
     Returns [] unless both parameters differ from their defaults; the default of THR_MAX is full throttle.
     """

@@ -1,4 +1,7 @@
-"""Import flight logs of other programs, judge each in its scenario, mission and wind, and fly its mission again."""
+"""Import flight logs of other programs, and judge each in its scenario, mission and wind.
+
+Its mission is flown again.
+"""
 
 import contextlib
 import hashlib
@@ -267,7 +270,10 @@ def _flight_setup(
 
 
 def _describe_log(flight: LoggedFlight) -> tuple[str, ...]:
-    """Return notes on a log that is incomplete, contains several flights, or has a throttle that never moves."""
+    """Return notes on a log with deficiencies.
+
+    It is incomplete, contains several flights, or has a throttle that never moves.
+    """
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -352,7 +358,9 @@ def fly_again(
     advance: Advance,
     max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
-    """Simulate each sequence of legs that the flight followed, in the wind of the log, and compare it with the log.
+    """Simulate each sequence of legs that the flight followed, and compare it with the log.
+
+    The simulation has the wind of the log.
 
     Return the comparisons, the longest sequence first.
 
@@ -371,7 +379,9 @@ def fly_again(
 
 @dataclass(frozen=True, slots=True)
 class DrawnFlight:
-    """Draw for one simulated flight: its deviations from the nominal aircraft, the log's wind and the logged positions.
+    """Draw for one simulated flight.
+
+    It has deviations from the nominal aircraft, the log's wind and the logged positions.
 
     variation: deviation of the aircraft from its model.
     wind: velocity added to the log's mean wind, towards north and east, m/s.
@@ -418,7 +428,9 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Return the setup with a first take-off item replaced by a waypoint where the flight reached its altitude.
+    """Return the setup with a first take-off item replaced by a waypoint.
+
+    The flight reached the item's altitude at this waypoint.
 
     A model's flight starts in the air, and a mission does not state the course of its take-off: the autopilot chooses
     it.  The setup is returned unchanged if the mission has no take-off, or if the first segment of the flight did not
@@ -466,7 +478,9 @@ def _refly_followed_legs(
     advance: Advance | None,
     draw: DrawnFlight | None = None,
 ) -> Reflight:
-    """Simulate a sequence of legs with the model of an aircraft, and compare the simulated flight with the log.
+    """Simulate a sequence of legs with an aircraft's model.
+
+    Compare the simulated flight with the log.
 
     legs: the sequence of legs, as the logged flight followed it.
     aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.

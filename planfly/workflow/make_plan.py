@@ -41,7 +41,9 @@ def make_plan(
     flown_plan_and_leg: tuple[Plan, int] | None = None,
     continues: bool = False,
 ) -> Plan:
-    """Plan a path within the limits of scenario and aircraft, with a margin for the uncertainty of the limits.
+    """Plan a path within the limits of scenario and aircraft.
+
+    A margin for the uncertainty of the limits is kept.
 
     All commands use this function, so that they agree on which plan is safe.  A plan may take several searches, which
     share the scenario's budget of evaluations.  In gusts, the plan has few waypoints at which the autopilot may orbit
@@ -133,7 +135,9 @@ def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoint
 
 
 def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Add to a plan the departure and the approach that the scenario requires, and complete its certificate.
+    """Add to a plan the departure and the approach that the scenario requires.
+
+    Complete the plan's certificate.
 
     The certificate then names the hazards near the final loiter, and the slopes and turns that cannot be flown in the
     local wind.

@@ -1,4 +1,6 @@
-"""Context of a mission whose items change: their positions, the setup of its flight, and its geometric verdict.
+"""Context of a mission whose items change.
+
+It gives their positions, the setup of its flight, and its geometric verdict.
 
 Scenario and aircraft are loaded once.  An unchanged mission is judged as it was opened, a plan with its certificate;
 a changed mission is judged like a mission file.

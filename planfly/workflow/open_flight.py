@@ -1,4 +1,7 @@
-"""Make the `FlightSetup` of a plan or a mission file with the options of its flight, and its preflight notes."""
+"""Make the `FlightSetup` of a plan or a mission file with the options of its flight.
+
+Preflight notes are added.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -92,7 +95,9 @@ def open_flight(
 
 
 def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
-    """Return a scenario with its terrain extended to the mission's home, if the link's ground station stands there.
+    """Return a scenario with its terrain extended to the mission's home.
+
+    This is done if the link's ground station stands there.
 
     The terrain is unchanged if its elevation file cannot be read, or has no data at home.
     """
@@ -251,7 +256,9 @@ def make_setup(
 
 
 def planned_duration(route: Route, mission: Mission) -> float:
-    """Return the duration of a mission's flight without wind, s; a loiter takes at least the time that its item states.
+    """Return the duration of a mission's flight without wind, s.
+
+    A loiter takes at least the time that its item states.
 
     route: route of the mission.
     """
@@ -477,7 +484,10 @@ _LEVEL_TEXT = "is level"
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Yield one note on wind and ground at the mission's landing; nothing if the scenario states its landing strip."""
+    """Yield one note on wind and ground at the mission's landing.
+
+    There is no note if the scenario states its landing strip.
+    """
     last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:

@@ -1,4 +1,7 @@
-"""Check output files and folders, and remove old results of planfly; other files are never overwritten."""
+"""Check output files and folders, and remove old results of planfly.
+
+Other files are never overwritten.
+"""
 
 import hashlib
 import os
@@ -153,7 +156,9 @@ def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) ->
 
 
 def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrite: bool) -> tuple[Path, ...]:
-    """Write files into a folder, and return their paths; files of an earlier result are replaced if `overwrite`.
+    """Write files into a folder, and return their paths.
+
+    Files of an earlier result are replaced if `overwrite`.
 
     contents: content of each file by its name.
     Raises PlanflyError as `check_output_folder`.

@@ -125,7 +125,9 @@ _DEFAULT_TASK = FlightTask()
 
 @dataclass(frozen=True, slots=True)
 class ReturnSummary:
-    """Returns to launch from a few points of a flight, simulated with a point mass, to accompany its verdict.
+    """Returns to launch from a few points of a flight, to accompany its verdict.
+
+    They are simulated with a point mass.
 
     line: summary of all returns in a line; "" if no return can be judged.
     world, starts, returns: environment, start points and results of the returns; None if no return is judged.
@@ -236,7 +238,9 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
 
 
 def flying_stage(setup: FlightSetup, kind: str = "") -> AbstractContextManager[Advance]:
-    """Return the context of the stage in which a setup is flown, which yields a function to report its progress.
+    """Return the context of the stage in which a setup is flown.
+
+    It yields a function to report the stage's progress.
 
     The stage's title states the length and the predicted duration, such as "flying 12.3 km, about 500 s in the air".
 
@@ -253,7 +257,9 @@ def flying_stage(setup: FlightSetup, kind: str = "") -> AbstractContextManager[A
 def fly_and_judge(
     setup: FlightSetup, task: FlightTask = _DEFAULT_TASK, flight: RunningFlight | None = None
 ) -> FlownMission:
-    """Fly a setup to its end or to a limit, record the flight if the task names a log, and judge the recorded rows.
+    """Fly a setup to its end or to a limit, and judge the recorded rows.
+
+    The flight is recorded if the task names a log.
 
     flight: the started flight of a program; None to start a flight as the task states.
     If the task asks for it, the verdict is explained by reference flights, and the log also gets returns.  A flight
@@ -359,7 +365,9 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
 def return_summary(
     setup: FlightSetup, track: Track | None, requirements: RouteRequirements | None = None
 ) -> ReturnSummary:
-    """Judge simulated returns to launch from a few points of a flight, or of the planned path if there is no track.
+    """Judge simulated returns to launch from a few points of a flight.
+
+    Without a track they are those of the planned path.
 
     The summary is empty without home or terrain.  If an error prevents the judgement, its line states the error.
 

@@ -1,4 +1,7 @@
-"""Explain the flight of an autopilot by reference flights with planfly's guidance and with other parameters."""
+"""Explain the flight of an autopilot by reference flights.
+
+They use planfly's guidance and other parameters.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -59,7 +62,9 @@ def find_passing_parameter(
     *,
     only_reached_limits: bool = False,
 ) -> DecidingParameter | None:
-    """Find an autopilot parameter with which a failed flight passes, and the passing value nearest to its own value.
+    """Find an autopilot parameter with which a failed flight passes.
+
+    Also find the passing value nearest to its own value.
 
     The autopilot lists the parameters to try, the candidates.  Returns None if none of them makes the flight pass.
 
@@ -173,7 +178,9 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 def judge_airframe_flight(
     setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
 ) -> AirframeAnswer:
-    """Fly a setup with planfly's guidance and no navigation error, to find out if the airframe can fly the mission.
+    """Fly a setup with planfly's guidance and no navigation error.
+
+    This shows if the airframe can fly the mission.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -248,7 +255,9 @@ CROSS_TRACK_ERROR_FRACTION = 0.1
 
 
 def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
-    """Return True if no failed finding fails or is undecided in a trial, with the margin that simulation errors need.
+    """Return True if no failed finding fails or is undecided in a trial.
+
+    The margin that simulation errors need is kept.
 
     trial_findings: findings of a flight with another parameter value.
     failed_findings: findings of the flight that failed.

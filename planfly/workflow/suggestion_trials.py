@@ -1,4 +1,6 @@
-"""Trial flights, and trials of the suggestions of a verdict: a suggestion is offered only if its trial passes.
+"""Trial flights, and trials of the suggestions of a verdict.
+
+A suggestion is offered only if its trial passes.
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight that reached the
 place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step
@@ -116,7 +118,9 @@ class Trial:
 
 
 def max_explaining_flights(setup: FlightSetup) -> int:
-    """Return how many flights, reference and trial flights together, may be flown to explain a setup's verdict.
+    """Return how many flights may be flown to explain a setup's verdict.
+
+    Reference and trial flights are counted together.
 
     >>> from logs.recording.example_log import example_log
     >>> max_explaining_flights(example_log().setup) > 100
@@ -193,7 +197,9 @@ def _is_undecided(finding: Finding) -> bool:
 
 
 def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
-    """Return the findings that fail or are undecided after a change but not before, each as (old finding, finding).
+    """Return the findings that fail or are undecided after a change but not before.
+
+    Each is a pair (old finding, finding).
 
     The old finding is None if there was none.  A finding that passed before and is not judged after the change is
     included.
@@ -285,7 +291,9 @@ class PassedTrial:
 
 
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
-    """Return the suggestions that passed, grouped by finding, those with the smallest moves of items first.
+    """Return the suggestions that passed, grouped by finding.
+
+    Suggestions with the smallest moves of items come first.
 
     A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller one passed, and is stated first otherwise.
     """
@@ -432,7 +440,9 @@ class SuggestionTrials:
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
 
     def _parts(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
-        """Yield suggestions with only a part of a suggestion's moves, the fewest moves first, each with its trial.
+        """Yield suggestions with only a part of a suggestion's moves, the fewest moves first.
+
+        Each has its trial.
 
         Nothing is yielded for fewer than two moves, and for changes of other kinds than `_PART_KINDS`.
         """
@@ -458,7 +468,9 @@ class SuggestionTrials:
                     yield smaller, self._trial(finding, smaller)
 
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
-        """Return True if a trial passes by geometry, and by a flight if the judged flight reached the finding's place.
+        """Return True if a trial passes by geometry and by a flight.
+
+        The flight is left out if the judged flight did not reach the finding's place.
 
         A trial fails if the allowed number of flights is used up.
         """
@@ -479,7 +491,10 @@ class SuggestionTrials:
         return self.judged.verdict.level == "flown" and not self._is_unreached(finding)
 
     def _is_unreached(self, finding: Finding) -> bool:
-        """Return True if a finding fails by geometry at a leg or waypoint that the judged flight did not reach."""
+        """Return True if a finding fails by geometry at a place that the judged flight did not reach.
+
+        The place is a leg or a waypoint.
+        """
         verdict, place = self.judged.verdict, finding.place
         if verdict.level != "flown" or verdict.complete or place.kind not in ("leg", "waypoint"):
             return False

@@ -80,7 +80,9 @@ def tightening_text(change: Tightening) -> str:
 
 
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
-    """Return the scenario for the next round of planning, tightened after failures, and the list of its changes.
+    """Return the scenario for the next round of planning, and the list of its changes.
+
+    It is tightened after failures.
 
     verdict: verdict on the flight of the last round.
     If nothing can be tightened, the scenario is returned unchanged and the list is empty.
@@ -208,7 +210,9 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds until a round is flyable, no limit can be tightened, or `max_rounds` is reached.
+    """Plan and fly in rounds.
+
+    The last round is flyable, has no limit that can be tightened, or is number `max_rounds`.
 
     Each further round tightens the limits that the last flight violated.
 

@@ -141,7 +141,10 @@ def scenario_aircraft(scenario: Scenario) -> Aircraft:
 
 
 def carried_energy(scenario: Scenario, aircraft: Aircraft) -> float:
-    """Return the energy that an aircraft carries, Wh: the scenario's battery_wh, or else the aircraft's own battery."""
+    """Return the energy that an aircraft carries, Wh.
+
+    It is the scenario's battery_wh, or else the aircraft's own battery.
+    """
     stated_energy = scenario.flight.battery_wh
     return aircraft.battery_energy / 3600.0 if stated_energy is None else stated_energy
 
@@ -166,7 +169,10 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 
 def with_tightened_limits(uav: Uav, scenario: Scenario) -> Uav:
-    """Return the UAV with the limits of a tightened scenario; envelope, airspeed and tracking error are kept."""
+    """Return the UAV with the limits of a tightened scenario.
+
+    Envelope, airspeed and tracking error are kept.
+    """
     old_limits = uav.limits
     limits = make_limits(scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
     return replace(uav, limits=replace(limits, tracking=old_limits.tracking))

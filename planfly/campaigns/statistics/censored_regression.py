@@ -227,7 +227,9 @@ _SEED = 1
 
 
 def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
-    """Return equally likely samples of a distribution with a known log-density, in random order, (count, k).
+    """Return equally likely samples of a distribution with a known log-density, (count, k).
+
+    They are in random order.
 
     The points are spread more evenly in the first coordinate than in the others.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
@@ -251,7 +253,10 @@ def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, cov
 
 @lru_cache
 def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
-    """Return points of the standard t distribution, (count, size), and their log-density up to a constant, (count,)."""
+    """Return points of the standard t distribution, (count, size), and their log-density, (count,).
+
+    The log-density is known up to a constant.
+    """
     from scipy.stats import chi2, norm, qmc
 
     # With a power of two points, Sobol's sequence is balanced.

@@ -1,4 +1,7 @@
-"""Decide from a campaign's flights if its target is reached, and which drawn quantity explains a margin."""
+"""Decide from a campaign's flights if its target is reached.
+
+Also find which drawn quantity explains a margin.
+"""
 
 import math
 from dataclasses import dataclass
@@ -52,7 +55,9 @@ class Tally(NamedTuple):
 
 
 def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return the exact two-sided interval of a success probability, by Clopper and Pearson (Biometrika 26, 1934).
+    """Return the exact two-sided interval of a success probability.
+
+    By Clopper and Pearson (Biometrika 26, 1934).
 
     Its coverage is at least ``confidence``.  It is 0 to 1 without trials.
 
@@ -63,7 +68,9 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return Wilson's two-sided score interval of a success probability (JASA 22, 1927), for use in pictures.
+    """Return Wilson's two-sided score interval of a success probability, for use in pictures.
+
+    Source: JASA 22, 1927.
 
     Its mean coverage is near ``confidence``.  It is 0 to 1 without trials.
 
@@ -181,7 +188,9 @@ class StoppingBound:
 
     @staticmethod
     def _mixture_components(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
-        """Return weight, a and b of the two mixture components: a beta distribution near 1, and Jeffreys' prior.
+        """Return weight, a and b of the two mixture components.
+
+        They are a beta distribution near 1, and Jeffreys' prior.
 
         scale, failures: a and b of the first component.
         """
@@ -255,7 +264,9 @@ def _times_log(count: int, p: float) -> float:
 
 
 def _log_mixture(components: tuple[tuple[float, float, float], ...], successes: int, failures: int) -> float:
-    """Return the log-likelihood of a sequence of outcomes if the success probability has a mixture of beta priors.
+    """Return the log-likelihood of a sequence of outcomes under a mixture of beta priors.
+
+    The priors are those of the success probability.
 
     components: weight, a and b of each distribution.
     successes, failures: numbers of flights.
@@ -439,7 +450,9 @@ def _split_into_groups(x: Floats, y: Floats) -> list[Floats]:
 
 
 def dependence_p_value(x: Floats, y: Floats) -> float:
-    """Return the p-value of a dependence of y on x: the probability of one at least as strong by chance, 0 to 1.
+    """Return the p-value of a dependence of y on x, 0 to 1.
+
+    It is the probability of a dependence at least as strong by chance.
 
     It is twice the smaller p-value of two tests.  One is the test of Kruskal and Wallis on the groups of
     `first_order_index` (Journal of the American Statistical Association 47, 1952).  The other is Spearman's test, which

@@ -42,7 +42,9 @@ _GRID_ABOVE_MPS = 10.0
 
 @dataclass(frozen=True)
 class FailureWindDistributions:
-    """Possible distributions of the wind above which a flight fails, one for each point of a grid of parameters.
+    """Possible distributions of the wind above which a flight fails.
+
+    There is one for each point of a grid of parameters.
 
     location, scale: parameters of the n distributions, m/s, (n,); mean and standard deviation of a normal distribution.
     normal_count: number of normal distributions, which come first; the others are Gumbel distributions with the same
@@ -67,7 +69,9 @@ class FailureWindDistributions:
         return cls(np.concatenate((mean, location)), np.concatenate((deviation, scale)), mean.size)
 
     def log_probabilities(self, speed: float) -> tuple[Floats, Floats]:
-        """Return, for each distribution, the log-probability that a flight fails in a wind, and that it succeeds.
+        """Return the log-probabilities that a flight fails in a wind, and that it succeeds.
+
+        There is one of each for each distribution.
 
         Both are arrays (n,).
 
@@ -250,7 +254,9 @@ def fit_modes(
 
 
 def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats:
-    """Return each flight's probability of failing in at least one mode, (n,), from the modes' mean coefficients.
+    """Return each flight's probability of failing in at least one mode, (n,).
+
+    It follows from the modes' mean coefficients.
 
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
@@ -323,7 +329,9 @@ def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) 
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
-    """Return the derivatives of the boundary's wind speed by each mode's coefficients, one array (2 + d,) per mode.
+    """Return the derivatives of the boundary's wind speed by each mode's coefficients.
+
+    There is one array (2 + d,) per mode.
 
     They are in m/s per unit of the coefficient, and follow from the implicit function theorem.
 

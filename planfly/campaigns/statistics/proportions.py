@@ -1,4 +1,7 @@
-"""Compare the shares of flyable flights of two campaigns, by pairs of flights or as independent samples."""
+"""Compare the shares of flyable flights of two campaigns.
+
+They are compared by pairs of flights or as independent samples.
+"""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,6 @@
-"""Estimate the largest wind in which a mission is flyable with a given probability, from flights in chosen winds.
+"""Estimate the largest wind in which a mission is flyable with a given probability.
+
+The estimate is made from flights in chosen winds.
 
 If some flights were flyable and some failed, the fraction of flights that fail in a wind is the mean of the failure
 modes over the possible draws, and the boundary is the wind in which this fraction is 1 - P (`boundary_quantiles`).  The
@@ -57,7 +59,9 @@ def boundary_quantiles(
     max_speed: float,
     probabilities: Sequence[float],
 ) -> list[float]:
-    """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``, in the order of `probabilities`.
+    """Return quantiles of the boundary's posterior, m/s, in the order of `probabilities`.
+
+    They lie between 0 and ``max_speed``.
 
     Each posterior sample of the coefficients gives one boundary, with the weight of its link; the quantiles are taken
     over these boundaries.
@@ -147,7 +151,9 @@ class _FailureFractions:
 
 @dataclass
 class DrawnNumbers:
-    """Draws of the quantities that vary between flights, other than the wind, in standard deviations from the means.
+    """Draws of the quantities that vary between flights, other than the wind.
+
+    They are in standard deviations from the means.
 
     population: (m, d) evenly spread possible draws; each represents the same share of flights.
     draw: function of start and stop index that returns the draws of these flights, (stop - start, d).
@@ -169,7 +175,9 @@ class DrawnNumbers:
 
 @dataclass(frozen=True)
 class WindBoundary:
-    """Posterior of the boundary: the largest wind in which the mission is flyable with the target probability, m/s.
+    """Posterior of the boundary, m/s.
+
+    The boundary is the largest wind in which the mission is flyable with the target probability.
 
     estimate: median of the posterior.
     low, high: two-sided interval of the posterior.
@@ -420,7 +428,7 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return by how much each flight is expected to reduce the boundary's variance between the fits, (m/s)^2, (n,).
+    """Return each flight's expected reduction of the boundary's variance between fits, (m/s)^2, (n,).
 
     The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction is the
     variance, over the two outcomes of a flight, of the mean boundary given the outcome.
@@ -444,7 +452,7 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return by how much each flight is expected to reduce the boundary's variance within this fit, (m/s)^2, (n,).
+        """Return each flight's expected reduction of the boundary's variance in this fit, (m/s)^2, (n,).
 
         The reduction is multiplied by the weight of the fit.
 
