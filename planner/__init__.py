@@ -1,4 +1,1 @@
-"""Path planner.
-
-It has encodings, constraints, objectives, preferences, and estimation of distribution algorithms.
-"""
+"""Path planner: encodings, constraints, objectives, and estimation of distribution algorithms."""

@@ -58,9 +58,7 @@ def replay_interval(log: FlightLog, start: float | None, end: float | None) -> t
 def timeline(
     log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
 ) -> tuple[TimelineEntry, ...]:
-    """Return the timeline of a flight.
-
-    It has legs, turns, clearances, threats and events in order of time.
+    """Return the timeline of a flight: legs, turns, clearances, threats and events in order of time.
 
     log: a flight log, or its path.
     start, end: start and end of the listed part in flight time, s; None for the start or end of the flight.
@@ -80,9 +78,7 @@ def timeline(
 
 @api_function()
 def instruments(log: FlightLog | str | Path) -> Instruments:
-    """Return the instruments of a recorded flight.
-
-    `Instruments.frame` formats their readings as text lines.
+    """Return the instruments of a recorded flight, which `Instruments.frame` formats as text lines.
 
     >>> import planfly
     >>> from logs.recording.example_log import example_log

@@ -1,4 +1,1 @@
-"""Campaigns: many flights of one mission, and the probability of success.
-
-Each flight has its own draw of the dispersions.
-"""
+"""Campaigns: many flights of one mission in drawn conditions, and the probability of success."""

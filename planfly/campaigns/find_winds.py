@@ -141,9 +141,7 @@ WindsAnswer = Literal["judged", "not flyable", "not judged in full", "not judged
 
 @dataclass(frozen=True, repr=False)
 class WindsResult:
-    """Result of a search: the boundary of each direction, and the flights.
-
-    The boundaries are estimated from the flights.
+    """Result of a search: the boundary of each direction, and the flights that determine it.
 
     boundaries: boundary of each direction; `judged` and `reasons` state which of them are only estimates, and why.
     flights: for each flight, the index of its direction, the wind speed, m/s, and True if it was flyable.

@@ -1,4 +1,1 @@
-"""Identify an aircraft from flight logs by estimating a model.
-
-The model is then written, replayed and shown.
-"""
+"""Identification of an aircraft from flight logs: its model is estimated, written and replayed."""

@@ -1,4 +1,1 @@
-"""The studio: a local page on which a mission is edited.
-
-The mission is judged while it is dragged, and flown after each drag.
-"""
+"""The studio: a local page on which a mission is dragged, judged meanwhile, and flown afterwards."""

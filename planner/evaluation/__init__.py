@@ -1,4 +1,1 @@
-"""Evaluation of a candidate path.
-
-It has the encoding, the problem as arrays, the scores, and the certificate.
-"""
+"""Evaluation of a candidate path: encoding, problem as arrays, scores, and certificate."""

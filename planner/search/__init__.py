@@ -1,4 +1,1 @@
-"""Whole searches: from a scenario to a certified plan.
-
-Replanning in flight and explanations of failures are included.
-"""
+"""Whole searches for a certified plan, replanning in flight, and explanations of failures."""

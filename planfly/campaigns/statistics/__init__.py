@@ -1,4 +1,1 @@
-"""Statistics of campaigns.
-
-They give the probability of a flyable flight, and the strongest wind that keeps a probability.
-"""
+"""Statistics of campaigns: the probability of a flyable flight, and the strongest flyable wind."""
