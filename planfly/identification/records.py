@@ -88,9 +88,7 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the segments of a log with wing-borne flight and without gaps in the data.
-
-    They are for an identification.
+    """Return the segments of a log for an identification: wing-borne flight without gaps in the data.
 
     aircraft: base aircraft, whose full deflections are used for the surfaces.
     servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
