@@ -193,6 +193,27 @@ def fence_problem(
     return None if is_in_inclusion else first_violation
 
 
+def describe_rally_violations(mission: Mission, origin: GeoOrigin, *, any_inclusion_suffices: bool) -> tuple[str, ...]:
+    """Return a sentence on each rally point that violates the mission's fence.
+
+    any_inclusion_suffices: see `fence_problem`.
+
+    Raises MissionError if a polygon has fewer corners than stated.
+    """
+    sentences = []
+    for number, point in enumerate(mission.rally, 1):
+        if not point.has_position:
+            continue
+        east, north = map(float, to_map(origin, point.lat_deg, point.lon_deg))
+        problem = fence_problem(mission.fences, origin, east, north, any_inclusion_suffices=any_inclusion_suffices)
+        if problem is not None:
+            violation, fence_item = problem
+            sentences.append(
+                f"rally point {number} lies {violation} (fence item {fence_item}): a return to it violates the fence"
+            )
+    return tuple(sentences)
+
+
 # Test whether a mission's path passes through a fence shape, given as its items, at any altitude.
 PassTest = Callable[[tuple[MissionItem, ...]], bool]
 

@@ -14,6 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
+from flight.mission.fences import describe_rally_violations
 from flight.mission.ground_phases import GroundPhases, display_waypoints, find_ground_phases, route_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
@@ -320,8 +321,10 @@ class FlightSetup:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on the parts of the mission that are not flown as written."""
-        return route_notes(self.route, self.ground_phases)
+        """Sentences on parts of the mission not flown as written, and on rally points beyond its fence."""
+        any_suffices = self.autopilot.checks.any_inclusion_suffices
+        rally_notes = describe_rally_violations(self.mission, self.scenario.origin, any_inclusion_suffices=any_suffices)
+        return (*route_notes(self.route, self.ground_phases), *rally_notes)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Return a copy of the setup in another scenario, with the same route, limits and path."""

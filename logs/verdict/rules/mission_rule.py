@@ -96,13 +96,14 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         results.sort(key=lambda result: {False: 0, None: 1, True: 2}[result[0]])
         ok, item, reason = results[0] if results else (True, None, "no objections")
         fault = reason if isinstance(reason, Message) else message(reason)
-        more_text = f" (and {count_text(len(results) - 1, 'more remark')})" if len(results) > 1 else ""
+        # Remarks on the mission as a whole name no item.
+        noun = "more remark" if any(other[1] is None for other in results[1:]) else "more item"
         findings.append(
             make_finding(
                 "mission",
                 Place("mission", item=item),
                 ok=ok,
-                reason=f"{fault.text}{more_text}{function_text}",
+                reason=f"{fault.text}{_more_text(len(results) - 1, noun)}{function_text}",
                 faults=[fault],
                 source=source,
                 method="mission items",
@@ -116,9 +117,8 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     ]
     if refused_items and dialect == "ardupilot":
         function = "mavlink_int_to_mission_cmd"
-        more_text = f" (and {count_text(len(refused_items) - 1, 'more item')})" if len(refused_items) > 1 else ""
         command_text = f"ArduPlane does not support {command_name(refused_items[0].command)}"
-        fault = message(command_text, f"{more_text}; PX4 accepts it")
+        fault = message(command_text, f"{_more_text(len(refused_items) - 1)}; PX4 accepts it")
         findings.append(
             make_finding(
                 "mission",
@@ -156,6 +156,11 @@ REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
+def _more_text(count: int, noun: str = "more item") -> str:
+    """Return a text on further items or remarks, such as " (and 2 more items)"; "" without any."""
+    return f" (and {count_text(count, noun)})" if count > 0 else ""
+
+
 def _unjoined_finding(setup: FlightSetup) -> Finding:
     """Return a finding on a waypoint or loiter to which no tangent leads.
 
@@ -170,7 +175,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
         reason = f"no tangent joins its circle to the circle of item {first_stop.circle}"
     else:
         reason = f"lies inside the circle of item {first_stop.circle}"
-    more_text = f" (and {count_text(len(other_stops), 'more item')})" if other_stops else ""
+    more_text = _more_text(len(other_stops))
     fault = message(
         reason,
         f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, on a path that is not judged"
@@ -218,7 +223,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     if not unreached:
         return []
     is_waiting_end, first = end.command in _WAITING_ENDS, unreached[0]
-    more_text = f" (and {count_text(len(unreached) - 1, 'more item')})" if len(unreached) > 1 else ""
+    more_text = _more_text(len(unreached) - 1)
     end_text = f": {command_name(end.command)} (item {end.seq}) ends the mission"
     end_text += " until someone sets the next item" if is_waiting_end else ""
     item_text = f"item {first.seq}: " if is_waiting_end else ""
@@ -466,7 +471,13 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimi
             continue
         angle = math.atan2(altitude_difference, distance)
         if angle > limits.landing_angle + PX4_LANDING_BUFFER_RAD:
-            reason = f"the landing glide slope is {math.degrees(angle):.1f}°, more than the maximum of {max_angle:.1f}°"
+            gentlest_distance = math.ceil(altitude_difference / math.tan(limits.landing_angle))
+            lowest_height = math.floor(distance * math.tan(limits.landing_angle))
+            reason = message(
+                f"the landing glide slope is {math.degrees(angle):.1f}°, more than the maximum of {max_angle:.1f}°",
+                f" of FW_LND_ANG: begin the glide {gentlest_distance} m instead of {distance:.0f} m before the landing"
+                f" point, or {lowest_height} m instead of {altitude_difference:.0f} m above it",
+            )
             yield REFUSED, item.seq, reason
 
 

@@ -205,6 +205,16 @@ def test_a_landing_is_as_steep_as_fw_lnd_ang(degrees: float, taken: bool) -> Non
     assert [item.ok for item in found] == [taken]
 
 
+def test_a_landing_that_is_too_steep_states_what_would_be_accepted() -> None:
+    """208.2 m down over 1,500 m at 7.5 degrees: 208.2 / 0.13165 = 1581.4 m, and 1500 * 0.13165 = 197.5 m."""
+    lines = (*GOOD, wp(1500, 0, 208.2), wp(0, 0, 0, command=21))
+    (found,) = [item for item in by_px4("FW_LND_ANG 7.5", *lines) if item.check == "checkFixedWindLandApproach"]
+    assert found.reason.startswith(
+        "the landing glide slope is 7.9°, more than the maximum of 7.5° of FW_LND_ANG: begin the glide 1582 m instead"
+        " of 1500 m before the landing point, or 197 m instead of 208 m above it (see PX4's"
+    )
+
+
 def test_first_waypoint_too_far() -> None:
     finding = of("checkDistanceToFirstWaypoint", wp(0, 500), wp(0, 1500), home=HOME_FAR)
     assert finding.ok is None
@@ -217,6 +227,7 @@ def test_a_good_landing_passes_every_check() -> None:
     findings = [item for item in judge_geometry(setup_of(*lines)).findings if item.rule == "mission"]
     assert len(findings) == 9
     assert all(item.ok for item in findings), [item.reason for item in findings]
+    assert not [item.reason for item in findings if "(and " in item.reason]
 
 
 def test_what_px4_only_remarks_on_does_not_fail() -> None:
@@ -261,6 +272,14 @@ def test_a_loiter_whose_circle_alone_leaves_the_fence_is_accepted_but_breaks_the
     assert {finding.rule for finding in failed} == {"fence"}
 
 
+def test_the_other_items_outside_the_fence_are_counted_as_items() -> None:
+    fence = _fence(5003, 1000, (0, 0))
+    setup = setup_of(*GOOD)
+    findings = mission_findings(replace(setup, mission=replace(setup.mission, fences=fence)))
+    (finding,) = [item for item in findings if item.check == "checkMissionAgainstGeofence"]
+    assert "outside an inclusion circle of radius 1000 m (fence item 0) (and 1 more item) (see PX4's" in finding.reason
+
+
 def test_px4_tests_the_positions_of_items_that_the_route_does_not_reach() -> None:
     """A waypoint after the RTL, 2.5 km outside a fence of 2.5 km, is no fault of a flight that PX4 does not refuse."""
     setup = setup_of(*GOOD, "3 20 0 0 0 0 0 0 0", wp(0, 5000))
@@ -269,6 +288,19 @@ def test_px4_tests_the_positions_of_items_that_the_route_does_not_reach() -> Non
         findings = judge_geometry(replace(fenced, autopilot=autopilot)).findings
         (finding,) = [item for item in findings if item.check == "checkMissionAgainstGeofence"]
         assert (finding.ok, finding.place.item) == (ok, 5)
+
+
+def test_a_rally_point_outside_the_fence_is_noted() -> None:
+    """The first and the third rally point lie within 1,700 m of home, the second 1,800 m east of it."""
+    fences = _fence(5003, 1700, (0, 0))
+    rally = _fence(5100, 0, (0, 300), (1800, 0), (-1600, 0))
+    setup = setup_of(*GOOD)
+    noted = replace(setup, mission=replace(setup.mission, fences=fences, rally=rally))
+    assert [note for note in judge_geometry(noted).notes if "rally" in note] == [
+        "rally point 2 lies outside an inclusion circle of radius 1700 m (fence item 0): a return to it violates the"
+        " fence"
+    ]
+    assert not [note for note in judge_geometry(setup).notes if "rally" in note]
 
 
 def _fence(command: int, p1: float, *places: tuple[float, float]) -> tuple[MissionItem, ...]:
