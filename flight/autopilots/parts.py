@@ -86,6 +86,7 @@ class TurnRules:
         the ground speed.
     reads_acceptance: True if the acceptance radius in a waypoint's item decides where the autopilot turns.
     acceptance_limit: maximum acceptance radius that the autopilot reads from an item, m.
+    acceptance_parameter: parameter of the default acceptance radius; "" without such a parameter.
     keeps_to_arcs: True if the autopilot flies each turn as an arc whose radius follows from the turn distance.
     max_bank: maximum bank that the autopilot demands, rad; inf if only the aircraft's limits apply.
     bank_parameter: parameter of that bank; "" without such a parameter.
@@ -96,6 +97,7 @@ class TurnRules:
     radii_at: Callable[[Floats], Floats] | None = None
     reads_acceptance: bool = True
     acceptance_limit: float = math.inf
+    acceptance_parameter: str = ""
     keeps_to_arcs: bool = True
     max_bank: float = math.inf
     bank_parameter: str = ""

@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 
+from flight.autopilots.parameter_set import ParameterSet
 from flight.mission.surveys import Survey
-from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, planned_switch_radius
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.rules.survey_rule import crab_text, overlap_text, relief_text, unusable_parts_text, usable_text
 from logs.verdict.tolerances import PHOTO_OVERLAP_TOLERANCE
@@ -83,6 +85,39 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
         else ""
     )
     return f"{text}{': ' if loss_text else ''}{loss_text}{photos_text}"
+
+
+def camera_off_text(requirements: RouteRequirements, lines: Sequence[Sequence[LineMeasure | None]]) -> str:
+    """Return a text on the radius within which the camera is switched off before the end of a line.
+
+    The text names the parameter that sets the radius.  It is "" if no line loses photos at its end because of the
+    radius.
+
+    lines: measures of each line of each survey; None for a line that was not flown.
+    """
+    autopilot, route = requirements.setup.autopilot, requirements.setup.route
+    turns, parameters = autopilot.turns, autopilot.parameters
+    radius_by_waypoint = {
+        line.camera_off_at: planned_switch_radius(requirements, line.camera_off_at)
+        for survey, measures in zip(requirements.surveys, lines, strict=True)
+        for line, measure in zip(survey.lines, measures, strict=True)
+        if line.camera_off_at >= 0
+        and measure is not None
+        and measure.camera_off > MIN_STATED_FRACTION
+        and measure.lost_at_end > 0.0
+    }
+    waypoint = max(radius_by_waypoint, key=lambda k: radius_by_waypoint[k], default=-1)
+    radius = radius_by_waypoint.get(waypoint, 0.0)
+    if radius <= 0.0:
+        return ""
+    item_radius = float(route.points["acceptance_radius"][waypoint]) if turns.reads_acceptance else 0.0
+    cause = "the acceptance radius of the item"
+    if item_radius <= 0.0 and turns.acceptance_parameter and isinstance(parameters, ParameterSet):
+        value = parameters[turns.acceptance_parameter]
+        cause = f"{turns.acceptance_parameter} {value:g} m"
+        if radius > value:
+            cause = f"the switch distance of the guidance, more than {cause}"
+    return f"{autopilot.title} switches the camera off up to {radius:.0f} m before the end of a line ({cause})"
 
 
 def survey_text(survey: Survey) -> str:

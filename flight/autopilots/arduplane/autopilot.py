@@ -259,6 +259,7 @@ class ArduPlane(Autopilot):
                 turn_distance(0.0, turn, parameters.wp_radius, math.inf, float(eas_to_tas_ratio(amsl)))
             ),
             acceptance_limit=MAX_ACCEPTANCE_M,
+            acceptance_parameter="WP_RADIUS",
             max_bank=parameters.roll_limit,
             bank_parameter="ROLL_LIMIT_DEG",
         )

@@ -384,6 +384,7 @@ class Px4(Autopilot):
             distance=self._turn_distance,
             radii_at=self._acceptance_radii if self.parameters.uses_switch_distance else None,
             reads_acceptance=False,
+            acceptance_parameter="NAV_ACC_RAD",
             max_bank=self.parameters["FW_R_LIM"],
             bank_parameter="FW_R_LIM",
         )

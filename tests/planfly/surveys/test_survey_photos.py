@@ -30,12 +30,19 @@ from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planfly.api.surveying import SurveyResult
 from planfly.surveys import survey_remedies as remedies
-from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text, slow_camera_text
+from planfly.surveys.survey_text import (
+    camera_off_text,
+    count_line_photos,
+    overlap_lines,
+    remedy_text,
+    slow_camera_text,
+)
 from planfly.terminal.survey_answers import overlap_entry
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.uav import uav_of_setup
 from tests.mission_lines import mission, setup_of, wp
 from tests.synthetic import fly_path
+from world.scenario_tables import Px4Version
 from world.wind import Wind
 
 # 23.5 mm by 15.6 mm behind 16 mm, 75 % and 65 % required, one photo per second, 6000 pixels across.
@@ -254,6 +261,33 @@ def test_the_missed_photos_and_those_on_the_line_add_up_to_the_planned_ones() ->
         assert measure is not None
         counts = (measure.planned_photo_count, measure.taken_photo_count, measure.missed_photo_count)
         assert counts == (22, taken, missed)
+
+
+@pytest.mark.parametrize(
+    ("text", "release", "end"),
+    [
+        ("NAV_ACC_RAD 60", "1.17", "60 m before the end of a line (NAV_ACC_RAD 60 m)"),
+        # The switch distance is 0.32 * 10 s * 0.7 = 2.24 s of flight. FW_AIRSPD_MAX is 20 m/s, or 20.4 m/s at 400 m.
+        ("NAV_ACC_RAD 60", "1.16", "60 m before the end of a line (NAV_ACC_RAD 60 m)"),
+        (
+            "NAV_ACC_RAD 10",
+            "1.16",
+            "46 m before the end of a line (the switch distance of the guidance, more than NAV_ACC_RAD 10 m)",
+        ),
+    ],
+)
+def test_the_parameter_that_switches_the_camera_off_is_named(text: str, release: Px4Version, end: str) -> None:
+    lines = [wp(0, -900)]
+    for k, (south, north) in enumerate(((0, 640), (640, 0), (0, 640))):
+        lines += [wp(400 * k, south), "2 206 29.25 0 1 0 0 0 0", wp(400 * k, north), "2 206 0 0 1 0 0 0 0"]
+    px4 = Px4(Px4Parameters.from_text(text, "a.params", release))
+    setup = replace(setup_of(*lines, wp(800, 1500)), autopilot=px4)
+    requirements, [survey] = route_requirements(setup), judged_surveys(setup)
+    aligned = align_track(requirements, fly_path(setup))
+    assert aligned is not None
+    measures = [measure_line(requirements, aligned, survey, line) for line in survey.lines]
+    assert camera_off_text(requirements, [measures]) == f"PX4 switches the camera off up to {end}"
+    assert camera_off_text(requirements, [[None] * len(measures)]) == ""
 
 
 def test_the_photos_on_the_lines_are_those_taken_there() -> None:
