@@ -250,6 +250,7 @@ class Camera:
         footprint; None for no requirement.
     interval: minimum time between photos, s; 0 if unknown.
     pixels_across: pixels of a photo across the track; 0 if unknown.
+    focal_length_mm: focal length, from which messages derive the size of the sensor; 10 mm if unknown.
     """
 
     across: float
@@ -258,6 +259,7 @@ class Camera:
     side: float | None = None
     interval: float = 0.0
     pixels_across: float = 0.0
+    focal_length_mm: float = field(default=10.0, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

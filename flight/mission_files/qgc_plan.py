@@ -152,7 +152,8 @@ class _CameraCalc(BaseModel):
             None if percent is None else percent / 100.0 for percent in (self.FrontalOverlap, self.SideOverlap)
         )
         pixels = self.ImageWidth if self.Landscape else self.ImageHeight
-        return Camera(across, along, front_overlap, side_overlap, self.MinTriggerInterval or 0.0, pixels or 0.0)
+        interval, focal_length = self.MinTriggerInterval or 0.0, self.FocalLength
+        return Camera(across, along, front_overlap, side_overlap, interval, pixels or 0.0, focal_length)
 
 
 def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warnings: list[str]) -> SurveyPlan:

@@ -106,6 +106,7 @@ class _Camera(SetupModel):
     side: Annotated[Finite, Field(ge=0.0, lt=1.0)] | None
     interval: Annotated[Finite, Field(ge=0.0, alias="interval_s")]
     pixels_across: Annotated[Finite, Field(ge=0.0)] = 0.0
+    focal_length_mm: Annotated[Finite, Field(gt=0.0)] = 10.0
 
 
 class _SurveyPlan(SetupModel):

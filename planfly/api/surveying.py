@@ -39,6 +39,7 @@ from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
+    camera_off_text,
     count_line_photos,
     is_line_unknown,
     is_line_usable,
@@ -75,6 +76,8 @@ class SurveyResult:
     nearest: the trial that came closest to success, if remedies were requested and none helps.
     kept: reason why the layout was kept and no other layout was tried, for messages.
     circles: text on circles that the autopilot flew at waypoints of the surveys because of their altitudes; "" without.
+    camera_off: text on the radius within which the camera is switched off before the end of a line; "" if no line loses
+        photos by it.
     files: files written; empty if no folder was named.
     """
 
@@ -89,6 +92,7 @@ class SurveyResult:
     nearest: NearMiss | None = None
     kept: str = ""
     circles: str = ""
+    camera_off: str = ""
     files: tuple[Path, ...] = ()
 
     @property
@@ -138,7 +142,7 @@ class SurveyResult:
         notes = camera_notes(self.setup.mission, self.setup.demanded_route, self.setup.scenario.wind, factor)
         gate_notes = [note for note in self.setup.demanded_route.notes if note.endswith(GATES_ARE_NO_WAYPOINTS)]
         texts += [f"note: {note}" for note in (*notes, *gate_notes)]
-        return (*texts, self.circles) if self.circles else tuple(texts)
+        return (*texts, *filter(None, (self.camera_off, self.circles)))
 
     @property
     def remedy_lines(self) -> tuple[str, ...]:
@@ -193,8 +197,8 @@ def survey(
     suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, gates
     (for PX4), an interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight;
     each is tested by a flight before it is suggested.
-    out: folder for a picture of the lines, and for the remedies as a .plan (for a .plan) or a .waypoints, and a .param;
-    None writes no files.
+    out: folder for a picture of the lines, and for the remedies as a .plan (for a .plan) or a .waypoints, and a .param
+    (for PX4 a .params); None writes no files.
     overwrite: True replaces results in the folder.
     options: options of a mission, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
@@ -210,7 +214,13 @@ def survey(
             raise ArgumentError.of_argument("camera", camera, allowed, shown=repr(camera))
         width, height, focal_length, *overlaps = camera_numbers
         front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)
-        user_camera = Camera(width / focal_length, height / focal_length, front_overlap, side_overlap)
+        user_camera = Camera(
+            width / focal_length,
+            height / focal_length,
+            front_overlap,
+            side_overlap,
+            focal_length_mm=focal_length,
+        )
     fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
         check_output_folder(Path(out), overwrite)
@@ -309,7 +319,8 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
                 text = px4_parameter_text(remedy.name, remedy.value, result.setup.autopilot.version)
             else:
                 text = parameters_text({remedy.name: remedy.value}, "suggested by planfly survey")
-            path = folder / "parameter.param"
+            # QGroundControl's files of PX4's parameters end in .params.
+            path = folder / f"parameter.{'params' if result.setup.autopilot.name == PX4 else 'param'}"
             write_atomically(path, text)
             files.append(path)
     return replace(result, files=tuple(files))
@@ -354,4 +365,7 @@ def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verd
     overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, survey) for survey in surveys)
     photos = 0 if aligned is None else count_flight_photos(requirements, aligned)
     circles_note = circles_text(requirements, survey_circles)
-    return SurveyResult(setup, track, verdict, surveys, lines, overlaps, photos, circles=circles_note)
+    camera_note = camera_off_text(requirements, lines)
+    return SurveyResult(
+        setup, track, verdict, surveys, lines, overlaps, photos, circles=circles_note, camera_off=camera_note
+    )

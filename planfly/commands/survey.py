@@ -89,14 +89,16 @@ def survey(args: argparse.Namespace) -> int:
         print(f"  written {path}{note}")
     if missions := [path for path in result.files if path.suffix in (".waypoints", ".plan")]:
         # Other commands judge a mission without camera items as a path, not as a survey.
-        settings = [f" --params {quote(str(path))}" for path in result.files if path.suffix == ".param"]
+        settings = [f" --params {quote(str(path))}" for path in result.files if path.suffix in (".param", ".params")]
         params_option = settings[0] if missions[0].stem == "parameter" and settings else ""
         # The suggested missions consist of plain items, which hold no camera.
         camera = next((overlap.camera for overlap in result.overlaps if overlap is not None), None)
         camera_option = ""
         if args.camera is None and camera is not None:
-            # State a camera with a focal length of 10 mm and the same footprint.
-            camera_option = f" --camera {10.0 * camera.across:.4g}x{10.0 * camera.along:.4g},10"
+            focal_length = camera.focal_length_mm
+            camera_option = (
+                f" --camera {focal_length * camera.across:.4g}x{focal_length * camera.along:.4g},{focal_length:g}"
+            )
             if camera.front is not None and camera.side is not None:
                 camera_option += f",{100.0 * camera.front:g},{100.0 * camera.side:g}"
         next_line = (

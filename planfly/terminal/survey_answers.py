@@ -77,7 +77,8 @@ class OverlapEntry:
     side_judged: bool
     """False if the side overlap is large enough, but the crab angle makes the common area too small."""
     crab_angle_deg: float
-    """Largest angle between the nose and the line at the usable photos; 0 without a flight."""
+    """Largest angle between the nose and the line at the usable photos, in wind or where the aircraft still turns onto
+    the line; 0 without a flight."""
     side_common_area: float | None
     """Common area of the two photos with the least side overlap, turned by their crab angles."""
     ground_sampling_cm: tuple[float, float] | None

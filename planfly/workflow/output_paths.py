@@ -54,6 +54,7 @@ SURVEY_FILES = (
         for kind in ("waypoints", "plan")
     ),
     "parameter.param",
+    "parameter.params",
 )
 # Maximum number of returns that an autopilot program may fly.
 MAX_BY_PROGRAM = 20

@@ -81,6 +81,7 @@ def test_the_camera_of_a_survey_is_read() -> None:
     assert 0.3 * 50.0 * plan.camera.along == pytest.approx(CALC["AdjustedFootprintFrontal"])
     assert 0.3 * 50.0 * plan.camera.across == pytest.approx(CALC["AdjustedFootprintSide"])
     assert (plan.camera.front, plan.camera.side, plan.camera.interval) == (0.7, 0.7, 0.0)
+    assert plan.camera.focal_length_mm == 4.5
     [turned] = plan_of_survey(CALC | {"Landscape": False, "MinTriggerInterval": 1.5}).survey_plans
     pixels = CALC["ImageWidth"], CALC["ImageHeight"]
     assert (plan.camera.pixels_across, plan.stated_photo) == (pixels[0], CALC["AdjustedFootprintFrontal"])

@@ -48,7 +48,7 @@ def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
 
 def test_what_is_kept_of_surveys_comes_back() -> None:
     plans = (
-        SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0, 6000.0), 24.0, 120.0),
+        SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0, 6000.0, 16.0), 24.0, 120.0),
         SurveyPlan(None),
         SurveyPlan(0.0, 10.0),
     )
@@ -59,7 +59,7 @@ def test_what_is_kept_of_surveys_comes_back() -> None:
         "turn_around_m": 30.0,
         "camera": {
             **{"across_m_per_m": 1.5, "along_m_per_m": 1.0, "front": 0.7, "side": None, "interval_s": 2.0},
-            "pixels_across": 6000.0,
+            **{"pixels_across": 6000.0, "focal_length_mm": 16.0},
         },
         "stated_photo_m": 24.0,
         "height_m": 120.0,

@@ -110,6 +110,24 @@ def test_a_parameter_that_would_help_is_written_beside_ones_own(
     assert len(Path("better/parameter.waypoints").read_text(encoding="ascii").splitlines()) == 19
 
 
+def test_parameters_of_px4_are_in_a_file_for_qgroundcontrol(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def found(setup: FlightSetup, _: Uav, verdict: Verdict, *__: Any) -> TriedRemedies:
+        of = SurveyRemedy("parameter", "NAV_ACC_RAD", 60.0, 10.0, "m", verdict, setup.mission, 5000.0)
+        return TriedRemedies((of,))
+
+    monkeypatch.setattr(surveying, "find_survey_remedies", found)
+    monkeypatch.chdir(tmp_path)
+    Path("own.params").write_text("1\t1\tNAV_ACC_RAD\t60\t9\n", encoding="ascii")
+    options = ["--aircraft", "x8", "--autopilot", "px4", "--params", "own.params", "--suggest", "--out", "better"]
+    assert main(["survey", str(FIELD_SURVEY), *options]) == 4
+    out = capsys.readouterr().out
+    assert "  written better/parameter.params\n" in out
+    assert "before the end of a line (NAV_ACC_RAD 60 m)\n" in out
+    assert Path("better/parameter.params").read_text(encoding="ascii") == "1\t1\tNAV_ACC_RAD\t10\t9\n"
+
+
 def test_a_layout_for_a_plan_is_a_plan_with_all_that_it_holds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -148,6 +166,17 @@ def test_a_layout_for_a_plan_is_a_plan_with_all_that_it_holds(
     written = read_mission(Path("better/turn-around.plan"))
     assert (len(written.items), len(written.fences), len(written.rally)) == (len(mission.items) - 1, 3, 1)
     assert written.autopilot == "px4"
+    # The camera of the plan is stated as it is: 23.5 mm by 15.6 mm behind 16 mm.
+    without_camera = options[: options.index("--camera")]
+
+    def with_camera(*how: Any) -> FlightSetup:
+        setup, camera = opened(*how), Camera(23.5 / 16.0, 15.6 / 16.0, 0.75, 0.6, focal_length_mm=16.0)
+        return replace(setup, mission=replace(setup.mission, survey_plans=(SurveyPlan(20.0, 0.0, camera),)))
+
+    monkeypatch.setattr(surveying, "open_flight", with_camera)
+    assert main(["survey", "field.plan", *without_camera, "--overwrite"]) == 4
+    next_command = "planfly survey better/turn-around.plan --camera 23.5x15.6,16,75,60 with the same options"
+    assert f"next      {next_command}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("camera", [(23.5, 15.6), (23.5, 0.0, 16.0), "23.5x15.6,16", (1.0, 1.0, 1.0, 70.0, 100.0), 5])
