@@ -18,7 +18,9 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.gust_height import gust_deviation
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
+from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.measures.route_requirements import judged_airspace, judged_surveys
+from logs.verdict.suggestions import home_height_text
 from world.errors import FlightError
 from world.json_schema import DocumentConfig
 from world.scenario import Scenario
@@ -78,6 +80,8 @@ class Conditions(DocumentConfig):
     """Altitude at which the wind has its speed; null without a gradient."""
     unused_parameters: tuple[str, ...] = ()
     """Names in the parameter file that have no effect on the simulated flight."""
+    notes: tuple[str, ...] = ()
+    """Notes on what is judged, such as a home that is far from the ground, or a landing that PX4 requires."""
 
 
 def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
@@ -137,7 +141,9 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
     For an imported flight, turbulence and navigation are None, and so is the mass of an unknown aircraft.
     """
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
-    conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
+    conditions = replace(
+        conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones), notes=mission_notes(setup)
+    )
     imported_log = setup.imported_log
     if imported_log is None:
         return conditions
@@ -152,6 +158,23 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
         autopilot=imported_log.program or "not stated",
         autopilot_version="",
     )
+
+
+def mission_notes(
+    setup: FlightSetup, home_effect: str | None = ", which shifts all heights above home"
+) -> tuple[str, ...]:
+    """Return notes on an uncertain aircraft, a doubtful home altitude, and a landing that PX4 requires.
+
+    home_effect: text after the home's height above the ground; None to omit the note on home.
+    """
+    notes = [f"the aircraft's model is from {setup.envelope.source}"] if setup.envelope.source else []
+    if home_effect is not None and (home_text := home_height_text(setup)):
+        notes.append(home_text + home_effect)
+    limits = setup.autopilot.checks.feasibility
+    is_flown_by_px4 = setup.autopilot.checks.dialect == "px4" and setup.imported_log is None
+    if is_flown_by_px4 and not limits.stated and missing_ends_text(setup.mission, limits):
+        notes.append(f"by default (MIS_TKO_LAND_REQ {limits.requires}) PX4 rejects a mission without a landing")
+    return tuple(notes)
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
@@ -208,8 +231,9 @@ def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
 
 
 def flown_condition_lines(conditions: Conditions) -> list[str]:
-    """Return three lines on a flight: its aircraft and airspeed, its weather and world, and its autopilot."""
-    return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
+    """Return the lines of `condition_lines`, a line that names the autopilot, and a line for each note."""
+    notes = [f"Note: {note}" for note in conditions.notes]
+    return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True), *notes]
 
 
 # Legs whose lines cross at no more than this angle can lie side by side.

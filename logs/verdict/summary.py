@@ -8,7 +8,7 @@ from flight.autopilots.autopilot import Origin
 from flight.autopilots.parameter_files import LONGEST_NAME
 from flight.autopilots.parameter_set import ParameterSet
 from flight.simulation.setup import FlightSetup
-from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, mission_notes
 from logs.verdict.findings import (
     AIRCRAFT_SLOPE,
     APART_FROM_FLIGHT,
@@ -24,7 +24,7 @@ from logs.verdict.findings import (
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
 from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, TAKE_OFF_RULES
-from logs.verdict.suggestions import home_height, home_height_text, lowest_clearance
+from logs.verdict.suggestions import home_height, lowest_clearance
 from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 from world.wording import count_text, is_one_edit
@@ -49,24 +49,14 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
 
     The note on home's altitude is left out if a finding already reports it.
     """
-    source, home_text = setup.envelope.source, home_height_text(setup)
-    notes = [f"the aircraft's model is from {source}"] if source else []
-    is_found = any(finding.rule == "clearance" and finding.place == FLIGHT for finding in findings)
-    if home_text and not is_found:
-        # With home on the ground the flight is lower by the height of the mission's home.
-        clearance = lowest_clearance(findings) - max(0.0, home_height(setup))
-        is_stated = home_height(setup) > 0.0 and math.isfinite(clearance)
-        effect_text = (
-            f"; with home on the ground the lowest clearance is {clearance:.1f} m"
-            if is_stated
-            else ", which shifts all heights above home"
-        )
-        notes.append(home_text + effect_text)
-    limits = setup.autopilot.checks.feasibility
-    is_flown_by_px4 = setup.autopilot.checks.dialect == "px4" and setup.imported_log is None
-    if is_flown_by_px4 and not limits.stated and missing_ends_text(setup.mission, limits):
-        notes.append(f"by default (MIS_TKO_LAND_REQ {limits.requires}) PX4 rejects a mission without a landing")
-    return tuple(notes)
+    # With home on the ground the flight is lower by the height of the mission's home.
+    height = home_height(setup)
+    clearance = lowest_clearance(findings) - max(0.0, height)
+    if any(finding.rule == "clearance" and finding.place == FLIGHT for finding in findings):
+        return mission_notes(setup, home_effect=None)
+    if height > 0.0 and math.isfinite(clearance):
+        return mission_notes(setup, f"; with home on the ground the lowest clearance is {clearance:.1f} m")
+    return mission_notes(setup)
 
 
 def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[str] = ()) -> str:

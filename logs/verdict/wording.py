@@ -308,22 +308,6 @@ def without_trial(suggestion: Suggestion) -> Suggestion:
     return tuple(replace(change, moves=(), remaining=(), not_flown=False) for change in suggestion)
 
 
-def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
-    """Return a margin with its sign and unit.
-
-    A note is added if a negative margin passes within the tolerance.
-
-    tolerance: the tolerance, in `unit`; None or 0 if it is not known.
-
-    >>> margin_text(12.0, "m", passed=True), margin_text(-3.04, "m", passed=False)
-    ('+12.0 m', '-3.0 m')
-    >>> margin_text(-0.3, "m", passed=True), margin_text(-0.3, "m", passed=True, tolerance=0.5)
-    ('-0.3 m, within the tolerance', '-0.3 m, within the tolerance of 0.5 m')
-    """
-    text = f"{margin:+.1f} {unit}"
-    return f"{text}, {within_tolerance_text(tolerance, unit)}" if passed and margin < 0.0 else text
-
-
 def within_tolerance_text(tolerance: float | None, unit: str) -> str:
     """Return the phrase for a value that is beyond its limit but passes.
 

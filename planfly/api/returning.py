@@ -166,9 +166,9 @@ class ReturnsResult:
                 f" differ by up to {max_difference:.0f} m"
             )
         home = self.setup.mission.home
-        if home is not None and (home_text := home_height_text(self.setup)):
+        if home is not None and home_height_text(self.setup):
             ground = home.alt - home_height(self.setup)
-            notes.append(f"{home_text}; for a launch from that ground, set home to {ground:.1f} m AMSL")
+            notes.append(f"for a launch from the ground at home, set home's altitude to {ground:.1f} m AMSL")
         if self.returns.stands_in:
             notes.append(
                 f"the return of {self.setup.autopilot.title} is not simulated; ArduPlane's return is used instead"

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, TypeGuard
 import numpy as np
 
 from aircraft.catalog import Aircraft, model_hash
+from aircraft.tracking import corridor_half_width
 from aircraft.uncertainty import DRAWS_FILE, read_draws
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import steady_flight
@@ -90,14 +91,23 @@ class CampaignBase:
     def inputs(self) -> dict[str, Any]:
         """Return all inputs of the flights except the code, by name; long inputs are replaced by hashes.
 
-        The inputs are seed, scenario, terrain, mission, aircraft model, autopilot parameters and dispersions.
+        The inputs are seed, scenario, terrain, mission, aircraft model, autopilot parameters and dispersions, and the
+        limits that aircraft and autopilot set because the scenario does not state them.
         """
         terrain, autopilot = self.scenario.terrain, self.uav.autopilot
+        implied_limits: dict[str, float] = {}
+        if self.scenario.limits.corridor_m is None:
+            implied_limits["corridor_m"] = corridor_half_width(None, autopilot.turns.acceptance_radius)
+        if self.scenario.flight.max_bank_deg is None:
+            implied_limits["max_bank_deg"] = round(math.degrees(self.uav.max_bank), 6)
+        if self.scenario.flight.airspeed_mps is None:
+            implied_limits["airspeed_mps"] = self.uav.airspeed
         parameters = autopilot.parameters
         return flatten_inputs(
             {
                 "seed": self.seed,
                 **self.scenario.to_json(),
+                "limits in effect": implied_limits,
                 "elevations": None if terrain is None else hash_input(terrain.heights.tobytes()),
                 "mission": hash_input(mission_text(self.mission, "waypoints")),
                 "fences": hash_input(repr(self.mission.fences)),

@@ -135,8 +135,9 @@ class CampaignResult:
         judged), ``place_RULE_index`` and ``place_RULE_item``, NaN if there is none.
 
         Drawn wind speeds (m/s) and directions (degrees) are added to the scenario's wind; ``mass``, ``drag``,
-        ``control_power`` and ``battery`` are factors.  ``margin_RULE`` has the unit of the rule in docs/campaigns.md
-        (m, m/s, degrees, Wh or %), and ``energy_left`` is in Wh.
+        ``control_power`` and ``battery`` are factors.  ``margin_RULE`` is the smallest distance from failing the rule:
+        a finding's margin plus its tolerance, in the unit of the rule in docs/campaigns.md (m, m/s, degrees, Wh or %).
+        ``energy_left`` is in Wh.
         """
         columns = with_place_numbers(self.columns)
         try:

@@ -16,7 +16,7 @@ from logs.verdict.junit import JunitCase, JunitSuite
 from logs.verdict.measures.mission_ends import missing_home_text
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.mission_rule import mission_findings
-from logs.verdict.wording import margin_text, place_text, quantity_text
+from logs.verdict.wording import place_text, quantity_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import (
@@ -423,8 +423,7 @@ def closest_text(row: FlightRow) -> str:
     if not scaled_margins:
         return ""
     _, rule, margin = min(scaled_margins, key=lambda entry: (entry[1] not in failed_rules, entry[0]))
-    value_text = margin_text(margin.value or 0.0, margin.unit, passed=rule not in failed_rules)
-    return f"{RULE_WORDS[rule].title} at {place_text(margin.place)}: {value_text}"
+    return f"{RULE_WORDS[rule].title} at {place_text(margin.place)}: {margin.value or 0.0:+.1f} {margin.unit}"
 
 
 def worst_flight_logs(worst: Sequence[FlightRow]) -> list[str]:
@@ -483,8 +482,8 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     ]
     lines += failure_lines(summary.by_rule, summary.mission_fault)
     lines += [
-        f"  narrow  {RULE_WORDS[entry.rule].title}: the smallest margin of all flights is"
-        f" {margin_text(entry.lowest or 0.0, entry.unit, passed=True)}"
+        f"  narrow  {RULE_WORDS[entry.rule].title}: the smallest margin of all flights, including the"
+        f" tolerance, is {entry.lowest or 0.0:+.1f} {entry.unit}"
         for entry in summary.ranking
         if entry.is_narrow_pass
     ]

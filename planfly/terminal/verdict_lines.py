@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.conditions import flown_condition_lines
+from logs.verdict.conditions import autopilot_line, condition_lines
 from logs.verdict.findings import Finding
 from logs.verdict.presentation import finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
@@ -126,6 +126,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         remedy = f"; {other_lines[0]}" if other_lines and not verdict.flyable else ""
         lines.append(f"{name}: " + colour_text(first, STATE_STYLES[verdict.state]) + remedy)
         if verdict.conditions is not None:
-            condition_texts = flown_condition_lines(verdict.conditions)
+            # The headline states the notes already.
+            condition_texts = [*condition_lines(verdict.conditions), autopilot_line(verdict.conditions, is_flown=True)]
             lines += [f"  {line}" for line in condition_texts]
     return lines

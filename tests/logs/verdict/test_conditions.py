@@ -11,7 +11,13 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup, ImportedLog
-from logs.verdict.conditions import condition_lines, corridor_line, judging_conditions, min_leg_spacing
+from logs.verdict.conditions import (
+    condition_lines,
+    corridor_line,
+    flown_condition_lines,
+    judging_conditions,
+    min_leg_spacing,
+)
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.verdict import verdict_json
 from tests.logs.made_flight import make_setup, make_track
@@ -206,3 +212,15 @@ def test_all_names_of_a_parameter_file_without_effect_are_data() -> None:
     )
     assert judging_conditions(replace(make_setup(), autopilot=law)).unused_parameters == tuple(names)
     assert judging_conditions(make_setup()).unused_parameters == ()
+
+
+def test_every_command_says_that_px4_requires_a_landing() -> None:
+    """`planfly fly` says it in the headline; campaigns, winds and returns have only the conditions."""
+    autopilot = Px4.load(FlightTable(autopilot="px4", px4_version="1.16"), load_aircraft("aerosonde"), "a")
+    setup = replace(make_setup(), autopilot=autopilot)
+    note = "by default (MIS_TKO_LAND_REQ 2) PX4 rejects a mission without a landing"
+    conditions = judging_conditions(setup)
+    assert conditions.notes == (note,)
+    assert flown_condition_lines(conditions)[-1] == f"Note: {note}"
+    assert note in judge_flight(setup, make_track(), "completed").lines[0]
+    assert judging_conditions(make_setup()).notes == ()

@@ -50,6 +50,15 @@ def test_a_parameter_is_named_with_its_source(tmp_path: Path) -> None:
     text = describe_differences(first, second)
     assert f"flight.params {file} (not stated before)" in text
     assert "parameters.WP_RADIUS 50.0 (file) instead of 90.0 (default)" in text
+    # Twice the acceptance radius.
+    assert "limits in effect.corridor_m 100.0 instead of 180.0" in text
+
+
+def test_a_corridor_that_the_scenario_states_is_no_limit_of_the_autopilot(base: CampaignBase) -> None:
+    limits = base.scenario.limits.model_copy(update={"corridor_m": 60.0})
+    stated = replace(base, scenario=replace(base.scenario, limits=limits))
+    assert "limits in effect.corridor_m" in base.inputs()
+    assert "limits in effect.corridor_m" not in stated.inputs()
 
 
 def test_no_more_than_six_are_described() -> None:

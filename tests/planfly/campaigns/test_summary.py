@@ -120,9 +120,9 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     goal = Goal(None, False, 4)
     with open_store(base, goal, tmp_path, resume=False) as store:
         store.add(with_margins(base, 0, ("clearance", 30.0), ("waypoint", 4.0), failed=("slope",)))
-        store.add(with_margins(base, 1, ("clearance", -0.3), ("waypoint", 14.0), failed=("slope",)))
+        store.add(with_margins(base, 1, ("clearance", 0.7), ("waypoint", 14.0), failed=("slope",)))
         store.add(with_margins(base, 2, ("clearance", 3.0), ("corridor", -2.0), failed=("corridor",)))
-        store.add(with_margins(base, 3, ("clearance", -0.5), ("height", 40.0)))
+        store.add(with_margins(base, 3, ("clearance", 0.5), ("height", 40.0)))
         summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
         ranked = [
             (entry["rule"], entry["failed"], entry["smallest_margin"])
@@ -131,7 +131,7 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     assert ranked == [
         ("slope", 2, None),
         ("corridor", 1, -2.0),
-        ("clearance", 0, -0.5),
+        ("clearance", 0, 0.5),
         ("waypoint", 0, 4.0),
         ("height", 0, 40.0),
     ]
@@ -139,15 +139,15 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     assert [line for line in lines if line.startswith(("  failed", "  narrow"))] == [
         "  failed  slopes in 2 flights: leg 2 in 2 flights",
         "  failed  corridor in 1 flight: leg 2 in 1 flight",
-        "  narrow  clearance: the smallest margin of all flights is -0.5 m, within the tolerance",
-        "  narrow  waypoints: the smallest margin of all flights is +4.0 m",
+        "  narrow  clearance: the smallest margin of all flights, including the tolerance, is +0.5 m",
+        "  narrow  waypoints: the smallest margin of all flights, including the tolerance, is +4.0 m",
     ]
     closest = {row.draw.index: closest_text(row) for row in summary.worst}
     assert closest == {
         0: "slopes failed at leg 2 by an unknown margin",
         1: "slopes failed at leg 2 by an unknown margin",
         2: "corridor at leg 1: -2.0 m",
-        3: "clearance at leg 1: -0.5 m, within the tolerance",
+        3: "clearance at leg 1: +0.5 m",
     }
 
 
