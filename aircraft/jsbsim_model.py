@@ -127,9 +127,10 @@ def _check_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[s
 def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
     """Return the property and the factors of an entry such as ``["fcs/elevator-pos-rad", 1.0]``.
 
+    key: name of the entry, for error messages.
     factor_count: required number of factors after the property.
 
-    Raises FlightError for another form, an invalid name of a property, or a factor of 0.
+    Raises FlightError for a malformed entry, an invalid property name, or a factor of 0.
     """
     is_valid = isinstance(value, list) and len(value) == 1 + factor_count and isinstance(value[0], str)
     # JSBSim aborts the process on a name with a space in it.

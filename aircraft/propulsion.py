@@ -73,9 +73,12 @@ class Propeller:
         return rho * (c0 * n**2 * d**4 + c1 * n * airspeed * d**3 + c2 * airspeed**2 * d**2)
 
     def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
-        """Return the coefficients of the torque (N m) as a polynomial of the propeller speed (rad/s).
+        """Return the coefficients of the torque (N m) as a polynomial in the propeller speed (rad/s).
 
         The coefficient of the highest power comes first.
+
+        airspeed: m/s.
+        rho: air density, kg/m^3.
         """
         c0, c1, c2 = self.torque
         d, turn = self.diameter, 2.0 * math.pi
@@ -95,9 +98,9 @@ _RAD_PER_REVOLUTION = 2.0 * math.pi
 
 
 def larger_root(square: float, linear: float, constant: float) -> float:
-    """Return the larger root of square x^2 + linear x + constant.
+    """Return the larger root of ``square * x**2 + linear * x + constant``, for ``square`` > 0.
 
-    A negative discriminant is replaced by 0.
+    Without a real root, return the abscissa of the minimum.
     """
     return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
 

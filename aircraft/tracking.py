@@ -121,7 +121,7 @@ def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: floa
     """Interpolate a table of shape (turns, speeds) bilinearly; outside the table use the nearest edge.
 
     turn: rad.
-    ground_speed: m/s, of which the ratio to `airspeed` is looked up.
+    ground_speed: m/s; the table is indexed by `ground_speed / airspeed`.
     """
     turns, speeds = table.shape
     turn_position = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)

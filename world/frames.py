@@ -206,7 +206,10 @@ class PolyMap:
 
     @staticmethod
     def from_rows(rows: Floats, residual: float) -> "PolyMap":
-        """Make a map from the rows of `to_rows`; n is at most `MAX_TERMS`."""
+        """Make a map from the rows that `to_rows` returned.
+
+        residual: largest error of the polynomial, in the unit of the result.
+        """
         size = rows.shape[1]
         return PolyMap(_make_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
 

@@ -190,7 +190,7 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
 
 
 def make_aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
-    """Return the aligned signals of all records, without sensor biases and with a scaled airspeed."""
+    """Align the signals of all records, remove sensor biases, and apply the fitted airspeed scale factor."""
     signals = remove_sensor_biases(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, flow_from_forces(signals, base, prior_means()))
 
@@ -210,9 +210,12 @@ def score_predictions(
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """Return the covariance of the fits (n, n) plus the covariance that results from the shifts (n,).
+    """Return the covariance (n, n) of the fitted parameters, systematic errors included.
 
-    For lift and drag, a variance is limited to the variance of the prior.
+    fitted: covariance of the fit (n, n).
+    shifts: change of the parameters (n,) that one standard deviation of each error source causes, by its name.
+
+    The variances of lift and drag do not exceed the variances of their priors.
 
     >>> shift = np.zeros(len(PARAMETERS))
     >>> shift[0] = 0.04

@@ -117,9 +117,9 @@ def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
 
 
 def find_program_class(program: Path) -> "type[ProgramAutopilot]":
-    """Return the class of the autopilot that a program is, such as ArduPlane for "arduplane".
+    """Return the autopilot class of a SITL executable, such as ArduPlane for "arduplane".
 
-    program: executable, built for software in the loop (SITL).
+    program: path of an executable built for software in the loop (SITL).
 
     >>> find_program_class(Path("arduplane")).name
     'ardupilot'

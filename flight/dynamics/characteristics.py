@@ -195,7 +195,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 def _step_response(
     aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
-    """Simulate the response to one control that moves at 1 s from level flight at cruise.
+    """Simulate the response to a pulse of one control that begins after 1 s of level cruise flight.
 
     control: name of the field of `flight.dynamics.state.Commands` that moves.
     size: deflection, rad, or fraction of full throttle.

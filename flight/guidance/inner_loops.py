@@ -69,12 +69,12 @@ def steer_elevator(
 ) -> None:
     """Set the elevator for a demanded upward acceleration.
 
-    The command is a feed-forward of the angle of attack, plus damping of the pitch rate.
+    The command is a feed-forward from the angle of attack, plus pitch-rate damping.
 
     state: attitude, airspeed and rates of the aircraft, a `STATE` record.
     gains, memory: a `GAINS` record, and a `GUIDANCE_MEMORY` record with the trimmed elevator and angle of attack.
     commands: `COMMANDS` record, whose elevator is set.
-    climb_rate: m/s.
+    climb_rate: current climb rate, m/s.
     acceleration: demanded acceleration, m/s^2, positive upwards.
     """
     airspeed = max(8.0, state.airspeed)

@@ -117,7 +117,8 @@ def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
 def pass_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
     """Advance the position in ``memory`` past sharp corners, to the leg that an autopilot already flies.
 
-    An autopilot may turn to a leg before it passes the end of the previous leg.
+    An autopilot may turn towards a leg before it passes the end of the previous leg.  A corner of more than 90 degrees
+    between straight pieces is sharp; the position stops before any other joint.
 
     leg: leg that the autopilot flies.
     Other arguments as for `find_on_path`.

@@ -143,7 +143,7 @@ OVER_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT
 
 
 def is_located(command: int, frame: int) -> bool:
-    """Return True if items with this MAV_CMD and MAV_FRAME state latitude, longitude and altitude."""
+    """Return True if items with this MAV_CMD and MAV_FRAME carry a latitude, longitude and altitude."""
     return frame != Frame.MISSION and (
         command <= _LAST_NAV_COMMAND or command in FENCES or command in _LOCATED_COMMANDS
     )

@@ -188,7 +188,7 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     continues byte by byte to the next valid record.
 
     state: progress of the walk, indexed by `_NEXT_BYTE` and so on; the walk continues from it and updates it.
-    letters: letters of all types of records.
+    letters: the known record types, one letter each.
     """
     is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:

@@ -380,9 +380,9 @@ class RuleFindings:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Row of the rule in a table with `RESULT_COLUMNS`.
+        """Cells of the rule's row in a table with the columns `RESULT_COLUMNS`.
 
-        For a rule that was not judged, the reason is in the column of the place.
+        If the rule was not judged, the cell for the place contains the reason.
         """
         place = self.shown.where if self.shown else "" if self.judged_count else self.findings[0].reason
         numbers = number_texts(self.shown) if self.shown else NumberTexts()
@@ -392,7 +392,7 @@ class RuleFindings:
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
     """Group findings by rule in the order of `RULE_WORDS`, with photo overlap as a group of its own.
 
-    A rule without findings is left out.
+    A rule without findings is omitted.  The worst of a rule's failed findings is first.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place

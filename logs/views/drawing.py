@@ -394,7 +394,7 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
     """Separate the legs by thin vertical lines, and write their numbers above the panel.
 
     marks: start of each leg on the horizontal axis, and its text, such as "leg 3".
-    has_leg_numbers: False for only the lines.  A number without space next to the number before it is left out.
+    has_leg_numbers: if False, only the lines are drawn.  A number that would overlap the previous number is omitted.
     """
     for value, _ in marks[1:]:
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)

@@ -141,7 +141,7 @@ class LabelPlacer:
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
     def _to_pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Convert positions in units of the axes, (n,) each, to pixels of the figure, (n, 2)."""
+        """Convert data coordinates, (n,) each, to display pixels, (n, 2)."""
         points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
         return np.asarray(self.axes.transData.transform(points), dtype=np.float64)
 

@@ -141,7 +141,7 @@ def outline_label_position(
     """Choose where to label the outline of a sphere in a vertical section.
 
     Return the distance (km) and the altitude (m AMSL) of a visible point of the outline, and the direction from there
-    to the label, as signs of right and up.  Return None if no part of the outline is visible.
+    to the label: right and up, each -1, 0 or 1.  Return None if no part of the outline is visible.
 
     kilometres: distance of each sample along the section, km, (s,).
     lower, upper: altitude of the sphere's surface, m AMSL, (s,), NaN outside the sphere.

@@ -118,7 +118,9 @@ class ColumnGuesses:
 def guess_columns(
     files: str | Path | Sequence[str | Path], table: str | Path, *, overwrite: bool = False
 ) -> ColumnGuesses:
-    """Write a table of columns for data files, guessed from names and values, for a person to check.
+    """Guess which column of data files holds which quantity; write the assignment to a table for review.
+
+    The guess is based on the columns' names and values.
 
     files: CSV, MAT, Parquet or HDF5 files of one flight, the main one first.
     table: the table to write, ``NAME.columns.toml`` or ``columns.toml``.  overwrite: True replaces an existing one.

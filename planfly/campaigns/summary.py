@@ -567,7 +567,7 @@ def _flyable_text(tally: Tally) -> str:
 
 
 def _to_plain_number(value: float | None) -> float | None:
-    """Return a number rounded for a JSON document, or None for NaN and infinity.
+    """Round a number to 9 decimals for a JSON document; return None for None, NaN and infinity.
 
     A negative zero becomes 0.
     """

@@ -122,7 +122,7 @@ def add_winds_parser(command_line: LineParser) -> None:
 
 
 def _add_shared_options(parser: CommandParser) -> None:
-    """Add the arguments and options that campaigns and searches for winds have in common."""
+    """Add the arguments and options that `campaign` and `winds` share."""
     add_flights_options(parser)
     parser.add_argument(
         "--resume",

@@ -76,7 +76,7 @@ def add_returns_parser(command_line: LineParser) -> None:
 
 
 def returns(args: argparse.Namespace) -> int:
-    """Judge returns to launch from all along a flight, and print the outcomes; return the exit code.
+    """Judge returns to launch from points along a whole flight, print the outcomes, return the exit code.
 
     The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if none is unsafe but some are undecided.
     """

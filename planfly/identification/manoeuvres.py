@@ -38,7 +38,7 @@ def make_identification_mission(
     *,
     max_rates: tuple[float, float] = (math.inf, math.inf),
 ) -> Mission:
-    """Return the mission of manoeuvres for an identification, around a home position.
+    """Return a mission of manoeuvres for system identification, around a home position.
 
     lat_deg, lon_deg, ground: home position, degrees and m AMSL.
     repeats: number of times that the sequence is flown.

@@ -57,7 +57,7 @@ def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
 
 
 def report_line(line: str) -> None:
-    """Send a line about the work to the receiver; without a receiver, log it as a warning."""
+    """Send a line of progress text to the current receiver, or log it as a warning if there is none."""
     receiver = _receiver.get()
     if receiver is not None:
         receiver.report_line(line)

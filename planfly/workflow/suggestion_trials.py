@@ -502,7 +502,10 @@ class SuggestionTrials:
         return is_beyond_end and finding_key(finding) in map(finding_key, self._current_trial.geometry_verdict.failed)
 
     def _compared_verdicts(self, trial: Trial, finding: Finding) -> tuple[Verdict, Verdict]:
-        """Return the verdicts before and after a trial's change: both on flights, or both by geometry."""
+        """Return the verdicts before and after a trial's change, both of the same level.
+
+        Both are verdicts of flights if the finding is tried by flight, otherwise of the planned path.
+        """
         if self._is_tried_by_flight(finding):
             return self.judged.verdict, trial.flight_verdict
         return self._current_trial.geometry_verdict, trial.geometry_verdict

@@ -233,11 +233,11 @@ def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
 
 
 def rotated_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding: inner waypoint i lies in interval i of the axis (section III).
+    """Make the rotated encoding of section III of the paper (Yang, Tang, Lozano, CEC 2014).
+
+    The axis from start to destination is divided into w - 2 intervals, and each inner waypoint lies in its interval.
 
     waypoints: number w of waypoints, including both ends.
-
-    The axis is divided into w - 2 intervals.
     """
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)

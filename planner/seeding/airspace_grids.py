@@ -114,7 +114,7 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
     ground: altitude of the ground at the start of the step, m, from which a zone's heights above ground are measured.
 
     If several exclusions block it, the range reaches from the lowest floor to the highest ceiling. If an inclusion
-    blocks it, all altitudes are closed.
+    blocks it, all altitudes are closed. If nothing blocks it, the range is empty: inf to -inf.
     """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):

@@ -469,7 +469,7 @@ class _ForecastReader:
     def _pressure_level_altitudes(self, datasets: Sequence[Any], wind: Any) -> Floats:
         """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL, from the geopotential height.
 
-        wind: variable of the wind.
+        wind: a wind variable of the dataset.
 
         Raises ForecastError if no dataset contains the geopotential height of these levels.
         """

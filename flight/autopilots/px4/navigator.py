@@ -436,7 +436,9 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed a waypoint on its circle by less than 90 degrees.
+    """Return True if the aircraft is 0 to 90 degrees past a waypoint on its loiter circle.
+
+    The sign of the circle's radius gives the direction of flight.
 
     estimated: estimated position and velocity over the ground, a `MOTION` record.
     corner: the waypoint on the circle, with the circle's center and radius, a `WAYPOINT` record.

@@ -271,7 +271,7 @@ class SitlFlight(ProgramFlight):
     def _ground_tick(self) -> Tick:
         """Compiled function for one tick of a flight that starts on the ground.
 
-        Raises ValueError if the program flies no take-off.
+        Programs that fly take-offs override this; for all others, it raises ValueError.
         """
         raise ValueError(f"the program of {self.setup.autopilot.title} flies no take-off: its flights start in the air")
 

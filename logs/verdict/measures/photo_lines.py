@@ -252,7 +252,7 @@ def _camera_on_rows(
 
     axis: axis of the line, onto which positions are projected.
     track_rows: range of the n rows in the track.
-    is_ahead: True for each row that flies along the line.
+    is_ahead: True for each row in which the aircraft flies along the line.
 
     The camera is on between two rows: the row that reaches the waypoint where the mission switches it on, and the row
     that reaches the waypoint where it is switched off.  Both waypoints may lie beyond the line's ends, and either may

@@ -80,7 +80,7 @@ def straight_span(
     The end is before the start if the leg has no such part.
 
     clearance: distance kept from the turns, m.
-    excludes_blends: True to exclude also the blends, the parts next to the turns on which the slope still changes.
+    excludes_blends: if True, the blends are excluded, too: the parts next to the turns where the slope still changes.
     """
     start_clearance, end_clearance = clearance, clearance
     if excludes_blends:

@@ -60,7 +60,7 @@ class Remedy:
 
 
 def is_improvement(before: Returns, after: Returns) -> bool:
-    """Return True if a change improves simulated returns and makes no kind of failure more frequent.
+    """Return True if a change gives more safe or fewer unsafe returns, and no more failures of any kind.
 
     before, after: returns without and with the change.
 

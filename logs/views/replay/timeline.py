@@ -57,7 +57,7 @@ class _LegRows:
 
 
 def timeline(log: FlightLog) -> list[TimelineEntry]:
-    """List the entries of a flight in order of time.
+    """Return the timeline of a flight: its events and legs in chronological order.
 
     >>> from logs.recording.example_log import example_log
     >>> for entry in timeline(example_log())[3:6]:
