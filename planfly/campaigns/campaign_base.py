@@ -112,7 +112,7 @@ class CampaignBase:
                 "mission": hash_input(mission_text(self.mission, "waypoints")),
                 "fences": hash_input(repr(self.mission.fences)),
                 "aircraft model": hash_input(model_hash(self.uav.aircraft)),
-                "autopilot": f"{autopilot.title} {autopilot.version}",
+                "autopilot": f"{autopilot.title} {autopilot.version}".strip(),
                 "parameters": {}
                 if parameters is None
                 else {name: f"{value!r} ({origin})" for name, value, origin in parameters.values},

@@ -64,7 +64,12 @@ def difference_texts(stored: Mapping[str, Any], current: Mapping[str, Any]) -> l
         and math.isclose(stored[name], current[name], rel_tol=1e-12)
     }
     names = [name for name in names if name not in rounded_names] or names
+    # Different autopilots have different parameters: state this once instead of naming each parameter.
+    autopilots = [str(inputs.get("autopilot", "")).partition(" ")[0] for inputs in (stored, current)]
     texts = []
+    if autopilots[0] != autopilots[1] and any(name.startswith("parameters.") for name in names):
+        names = [name for name in names if not name.startswith("parameters.")]
+        texts.append("parameters: each autopilot has its own")
     for name in names:
         old, new = stored.get(name), current.get(name)
         if str(old if new is None else new).startswith(_HASH_PREFIX):

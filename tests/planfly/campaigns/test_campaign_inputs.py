@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign
-from planfly.campaigns.campaign_inputs import describe_differences
+from planfly.campaigns.campaign_inputs import describe_differences, difference_texts
 from planfly.campaigns.dispersions import default_dispersions, parse_dispersions
 from planfly.flight_options import MissionOptions
 from tests.planfly.campaigns.made_campaigns import write_short
@@ -73,3 +73,18 @@ def test_rounding_is_named_only_if_nothing_else_differs() -> None:
     stored, current = {"a": 250.0, "b": 1.0}, {"a": 250.00000000000003, "b": 2.0}
     assert describe_differences(stored, current) == "b 2.0 instead of 1.0"
     assert describe_differences(stored, current | {"b": 1.0}) == "a 250.00000000000003 instead of 250.0"
+
+
+def test_the_parameters_of_another_autopilot_are_not_named_one_by_one() -> None:
+    stored = {"autopilot": "PX4 1.17", "parameters.NAV_ACC_RAD": "10.0 (default)", "parameters.FW_R_LIM": "30.0"}
+    current = {"autopilot": "ArduPlane 4.7", "parameters.WP_RADIUS": "90.0 (default)"}
+    assert difference_texts(stored, current) == [
+        "parameters: each autopilot has its own",
+        "autopilot ArduPlane 4.7 instead of PX4 1.17",
+    ]
+    # Two versions of one autopilot have the same parameters.
+    newer = stored | {"autopilot": "PX4 1.18", "parameters.FW_R_LIM": "35.0"}
+    assert difference_texts(stored, newer) == [
+        "autopilot PX4 1.18 instead of PX4 1.17",
+        "parameters.FW_R_LIM 35.0 instead of 30.0",
+    ]
