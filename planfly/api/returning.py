@@ -168,7 +168,10 @@ class ReturnsResult:
         home = self.setup.mission.home
         if home is not None and home_height_text(self.setup):
             ground = home.alt - home_height(self.setup)
-            notes.append(f"for a launch from the ground at home, set home's altitude to {ground:.1f} m AMSL")
+            notes.append(
+                f"for a launch from the ground at home, set home's altitude to {ground:.1f} m AMSL instead of"
+                f" {home.alt:.1f} m"
+            )
         if self.returns.stands_in:
             notes.append(
                 f"the return of {self.setup.autopilot.title} is not simulated; ArduPlane's return is used instead"
